@@ -8,7 +8,7 @@ use zip::CompressionMethod;
 
 use super::findings::Findings;
 
-/// Why rules are skipped that read modelDescription.xml.
+/// Reason in the report for skipping a rule that reads modelDescription.xml.
 pub const NO_DESCRIPTION: &str = "there is no modelDescription.xml that can be unpacked";
 
 const AT_THE_TOP: [&str; 9] = [

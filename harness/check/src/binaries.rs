@@ -73,8 +73,8 @@ pub struct Binaries {
     placed: Vec<Placed>,
     /// Number of binaries with the model's name in folders whose names the standard does not define (folders of vendors).
     of_vendors: usize,
-    /// Files in the folders that FMI 2.0 defines for binaries which no host finds because of their names, each with the
-    /// name that hosts look for.
+    /// Libraries that no host loads, because their names differ from the name that FMI requires in their folder: path
+    /// and required name.
     elsewhere: Vec<(String, String)>,
     declared: Vec<Declared>,
     has_sources: bool,
@@ -114,8 +114,9 @@ impl Binaries {
         all
     }
 
-    /// `declared` has the interfaces, or `None` if the description cannot be read. `platform` returns file ending and
-    /// format for the name of a folder; `own_folder` is the folder for the platform of this check.
+    /// Finds the binaries in an archive. `declared` are the interfaces in modelDescription.xml, or `None` if it
+    /// cannot be read. `platform` returns the file ending and the format of the binaries in a folder such as `win64`;
+    /// `own_folder` is the folder with the binaries for this computer.
     fn read(
         archive: &Archive,
         declared: Option<Vec<Declared>>,

@@ -107,7 +107,8 @@ pub struct Variable {
 pub struct Unknown {
     pub list: String,
     pub line: u64,
-    /// Key of the variable; if it is not a number, 0 in FMI 2.0 and `None` in FMI 3.0.
+    /// Key of the variable that this entry names. If the attribute in the file is not a number, the key is 0 in FMI
+    /// 2.0 and `None` in FMI 3.0.
     pub key: Option<u32>,
     /// Keys of the variables that this unknown depends on. `None` if the attribute is missing, which means
     /// that it may depend on everything.
@@ -299,8 +300,9 @@ impl Description {
     }
 }
 
-/// Reads a variable; in FMI 2.0 the caller corrects its key. `types` maps the names of declared types to the types, from
-/// which missing attributes are inherited; `sizes` maps value references of structural parameters to their start values.
+/// Reads a variable from its element. In FMI 2.0 the caller replaces its `key`, which depends on the position of the
+/// element in the file. `types` maps the names of declared types to the types, from which missing attributes are
+/// inherited; `sizes` maps value references of structural parameters to their start values.
 fn variable(
     words: &Words,
     element: &Element,

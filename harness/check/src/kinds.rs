@@ -16,8 +16,8 @@ use super::under_test::{FmuUnderTest, Interface, Session};
 use host::description::Value;
 
 const STARTS: u64 = 12;
-/// Allowed relative difference between two measurements of the factor between a known and an
-/// unknown.
+/// Largest relative difference at which two measured factors count as equal. A factor is the derivative of an unknown
+/// with respect to a known.
 const AGREE: f64 = 1e-4;
 
 struct Pair<'d> {
@@ -101,8 +101,9 @@ fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Facto
         .then_some(Factor { value, rounding: 1e3 * f64::EPSILON * size / dx.abs() }))
 }
 
-/// Measures the factors of all pairs at three points of one session, and reports each pair whose factor changes, unless
-/// it is in `wrong`, the pairs that were already reported. Returns the factors at the first point.
+/// Measures the factor of each pair, which is the derivative of its unknown with respect to its known, at three
+/// points of one session. Reports each pair whose factor changes, and adds its position to `wrong`; pairs that are
+/// already in `wrong` are not measured again. Returns the factors at the first point.
 fn at_points(
     session: &mut Session,
     pairs: &[Pair],

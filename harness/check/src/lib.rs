@@ -237,9 +237,9 @@ const OWNERS: [(&str, &str); 6] = [
     ("a step from", "exchange.run"),
 ];
 
-/// Reports each failing call only once. A call that crashes or is refused stops every rule that makes it. Only the rule
-/// that owns the call keeps its finding, or, for a call without an owner, the first rule that was stopped. All other
-/// rules that make the call are skipped.
+/// Makes sure that a failing call is reported only once, although it stops every rule that makes this call.
+/// [`OWNERS`] defines which rule reports a call; a call without an owner is reported by the first rule that it
+/// stopped. All other rules that make the call are skipped.
 fn name_each_cause_once(outcomes: &mut [Outcome]) {
     let alike = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".-+e".contains(c), "");
     // rules whose only finding is the call at which they stopped, as positions in the table
@@ -268,8 +268,8 @@ fn name_each_cause_once(outcomes: &mut [Outcome]) {
     }
 }
 
-/// Turns a skipped rule into a finding if the rule that should have reported the cause was checked and found nothing.
-/// Otherwise no rule would report the fault.
+/// Makes sure that each fault is reported. A rule that meets a fault is skipped if another rule is responsible for
+/// this fault. If the other rule was checked without a finding, the skipped rule gets the finding.
 fn restore_unreported_faults(outcomes: &mut [Outcome]) {
     let silent: Vec<&str> = outcomes
         .iter()

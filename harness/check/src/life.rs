@@ -114,7 +114,8 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     // The standard requires a URI, so that only an FMU without resources has to work with NULL.
     let place = "fmi2Instantiate with the resource location NULL";
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
-    let answer = fmu.with_open_effect(place, findings, || fmu.instantiate(interface, &with))?;
+    let answer =
+        fmu.with_undefined_effect(place, findings, || fmu.instantiate(interface, &with))?;
     if let Err(error) = answer
         && fmu.description.interface("CoSimulation").is_some()
     {
@@ -128,7 +129,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     ] {
         let place = format!("fmi2Instantiate with {what}");
         let answer =
-            fmu.with_open_effect(&place, findings, || fmu.instantiate(interface, &with))?;
+            fmu.with_undefined_effect(&place, findings, || fmu.instantiate(interface, &with))?;
         expect_null(findings, &place, answer);
     }
     Ok(())
@@ -216,7 +217,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // Hosts must pass a logger. An FMU may refuse an instance without one, but should not crash.
     let with = Instantiation { callbacks: Callbacks::Empty, ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with callbacks that are all NULL";
-    let answer = fmu.with_open_effect(place, findings, || {
+    let answer = fmu.with_undefined_effect(place, findings, || {
         fmu.instantiate(interface, &with)?
             .map_or(Ok(()), |instance| initialise_and_refuse(fmu, instance))
     });
@@ -268,7 +269,7 @@ pub fn free_null<V: Tested>(fmu: &UnderTest<V>, _: &mut Findings) -> Result<()> 
 
 pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for binary in fmu.binaries() {
-        let answers = fmu.with_open_effect("a call with the instance NULL", findings, || {
+        let answers = fmu.with_undefined_effect("a call with the instance NULL", findings, || {
             binary.calls_with_null_instance()
         });
         for (call, status) in answers {
@@ -454,7 +455,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 let mut session = fmu.session_in(interface, *stage)?;
                 let state = stage.name();
                 let place = format!("{call} in state \"{state}\" ({interface})");
-                let answer = fmu.with_open_effect(&place, findings, || made(&mut session));
+                let answer = fmu.with_undefined_effect(&place, findings, || made(&mut session));
                 expect_refusal(findings, place, answer);
             }
         }

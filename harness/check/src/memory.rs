@@ -12,14 +12,14 @@ use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, skip};
 
 const MOST: usize = 500;
-/// Time limit of the first window. Its number of calls is then the number of calls in all other windows.
+/// Time limit of the first window of calls. All further windows have as many calls as were made within this time.
 const LONGEST: Duration = Duration::from_millis(500);
 /// Smallest number of calls in a window from which a leak can be concluded.
 const FEWEST: usize = 10;
 /// Number of windows after the first one, each of which must need more memory.
 const WINDOWS: usize = 3;
-/// Growth of the memory in bytes per step above which the FMU leaks. Less growth is allowed, because an FMU may
-/// store a short history.
+/// Growth of the memory, in bytes per step, above which the rule reports a leak. Less growth is allowed, because an
+/// FMU may store a short history.
 const PER_STEP: u64 = 1024;
 
 fn writable_memory() -> Option<u64> {
@@ -29,7 +29,9 @@ fn writable_memory() -> Option<u64> {
     Some(1024 * kilobytes)
 }
 
-/// Returns the number of bytes that each `call` leaks, or `None` if at least one window needs no further memory.
+/// Makes the same call several hundred times, and returns the average growth of the memory per call, bytes. The calls
+/// are divided into windows of equally many calls. Returns `None` if the memory does not grow in one of the windows,
+/// or if the calls take too long to decide.
 fn leak_per_call(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
     let started = Instant::now();
     let mut count = 0;

@@ -49,7 +49,8 @@ pub struct Unpacked<'a> {
     pub description: &'a Path,
 }
 
-/// Checks `rule` in a separate process and stores its findings. Skips the rule if `so_far` has a reason to skip it.
+/// Checks `rule` in a separate process and stores its findings. Skips the rule if earlier rules have found that the
+/// binary cannot be loaded, or that too many calls never return; `so_far` contains these results.
 pub fn check(
     rule: &'static Rule,
     fmu: Unpacked,
@@ -241,7 +242,8 @@ mod tests {
 
     use super::*;
 
-    /// Argument that marks the process of the rule. The test harness reads it as the name of a test, which does not exist.
+    /// Command-line argument by which the test recognises that it runs in the child process. The test harness reads
+    /// the argument as the name of a further test, so that no test may have this name.
     const CHILD: &str = "process_of_the_rule";
 
     #[test]

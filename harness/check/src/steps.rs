@@ -67,7 +67,7 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             fmu.announce(&place);
             session.instance.do_step(time, h)
         } else {
-            fmu.with_open_effect(&place, findings, || session.instance.do_step(time, h))
+            fmu.with_undefined_effect(&place, findings, || session.instance.do_step(time, h))
         };
         let is_refused = answer.is_err();
         expect_refusal(findings, place.clone(), answer);
@@ -92,7 +92,7 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         );
         let step = session.step;
         let answer =
-            fmu.with_open_effect(&place, findings, || session.instance.do_step(wrong, step));
+            fmu.with_undefined_effect(&place, findings, || session.instance.do_step(wrong, step));
         expect_refusal(findings, place, answer);
     }
     Ok(())
@@ -246,8 +246,8 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const SEEN: f64 = 1e-6;
     /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
-    /// If two values differ by less than this fraction of the change within one step, the value counts as equal to the
-    /// value of one step earlier.
+    /// Largest difference between two values that count as equal, relative to the largest difference between the
+    /// simulations with long and with short steps.
     const SAME: f64 = 0.02;
     let usual = after_three_steps(fmu)?.step;
     let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();
@@ -324,7 +324,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for v in &inputs {
         let mut session = fmu.running(Interface::CoSimulation)?;
         let place = format!("{} = NaN, then a step", v.name);
-        let refused = fmu.with_open_effect(&place, findings, || {
+        let refused = fmu.with_undefined_effect(&place, findings, || {
             session.set(v, &Value::Real(f64::NAN)).is_err()
                 || session.make_step(session.step).is_err()
         });

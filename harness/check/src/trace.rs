@@ -9,7 +9,8 @@ use super::findings::Findings;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Crash {
     Error,
-    /// A crash has the severity of the rule, because the standard does not define the effect of the call.
+    /// A crash is an error or a warning, according to the [`Severity`](super::findings::Severity) of the rule,
+    /// because the standard does not define the effect of the call.
     Open,
     /// Another rule with this name reports the crash, so that the present rule is skipped.
     ReportedBy(String),

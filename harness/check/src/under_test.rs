@@ -36,7 +36,8 @@ const PATIENCE: Duration = Duration::from_secs(3);
 #[derive(Debug, thiserror::Error)]
 #[error("{why}")]
 pub struct Unusable {
-    /// Identifier of the rule that reports the reason; empty if the FMU has no fault.
+    /// Identifier of the rule that reports the reason `why`; empty if the reason is not a fault, for example a
+    /// missing capability.
     pub rule: &'static str,
     pub why: String,
 }
@@ -93,12 +94,12 @@ pub trait Tested: Version + 'static {
     const TERMINATION: Option<&'static str>;
     /// Description of the call that reads a Real with a value reference that no variable has.
     const UNKNOWN_READ: &'static str;
-    /// True if `load.opens` also reports an interface whose binary is missing.
+    /// True if the rule `load.opens` reports missing binaries in addition to binaries that cannot be loaded.
     const REPORTS_MISSING: bool;
-    /// Smallest number of steps in the experiment that the FMU suggests at which the rules use Model Exchange; 0 for any
-    /// number. A very short experiment is not used, because the model may do anything after its end.
+    /// Smallest number of steps into which the rules divide the DefaultExperiment in Model Exchange; 0 for no limit. With
+    /// this limit a simulation does not leave a short experiment, after whose end the model may do anything.
     const EXCHANGE_STEPS: f64;
-    /// Smallest number of steps in the suggested experiment at which the check uses the suggested step size.
+    /// Number of steps that the DefaultExperiment of the FMU must contain so that the check uses its step size.
     const SUGGESTED_STEPS: f64;
     type Notes;
 
@@ -146,7 +147,8 @@ pub struct UnderTest<V: Tested = Fmi2> {
     pub outputs: Vec<&'static Variable>,
     directory: PathBuf,
     path: PathBuf,
-    /// State of the process before the binary was loaded, by name; see [`surroundings`].
+    /// State of the process before the binary was loaded, for example its locale and its working directory, as pairs
+    /// of a name and a value ([`surroundings`]).
     pub before: Vec<(&'static str, String)>,
     /// The loaded binaries: one, or two if modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu<V>>,
@@ -285,9 +287,10 @@ impl<V: Tested> UnderTest<V> {
         self.with_crash(Crash::ReportedBy(rule.into()), calls)
     }
 
-    /// Makes calls whose effect the standard does not define. A crash has the severity of the rule. If the calls take
-    /// longer than [`PATIENCE`], the process writes its findings, adds that the calls do not return, and exits.
-    pub fn with_open_effect<T>(
+    /// Makes calls whose effect the standard does not define. If a call crashes, the finding is an error or a
+    /// warning, according to the severity of the rule. If the calls take longer than [`PATIENCE`], the process writes
+    /// its findings, adds that the calls do not return, and exits.
+    pub fn with_undefined_effect<T>(
         &self,
         what: impl Into<String>,
         findings: &Findings,
@@ -360,8 +363,9 @@ impl<V: Tested> UnderTest<V> {
         self.binary(interface).is_ok()
     }
 
-    /// Creates an instance by `make`. The outer error ends the rule: the FMU allows only one instance in a process and
-    /// has already created it, or the deadline has passed.
+    /// Calls `make`, which creates an instance. The inner error is the error that `make` returned. The outer error
+    /// means that `make` was not called: the FMU allows only one instance in a process and has already created it, or
+    /// the deadline has passed.
     pub fn make<T, E>(
         &self,
         interface: Interface,

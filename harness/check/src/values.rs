@@ -354,7 +354,7 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for x in [f64::NAN, f64::INFINITY] {
             let mut session = fmu.session(fmu.first_interface()?)?;
             let place = format!("{} = {x}, then a step", v.name);
-            let refused = fmu.with_open_effect(&place, findings, || {
+            let refused = fmu.with_undefined_effect(&place, findings, || {
                 session.set(v, &Value::Real(x)).is_err()
                     || session.initialise().is_err()
                     || session.make_step(session.step).is_err()

@@ -93,7 +93,7 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
 /// the solvers other than the FMU.
 struct Smooth<'a> {
     torque: &'a [f64],
-    /// Rate over which the sign of the hub's rate is smoothed in the friction, rad/s.
+    /// Rate of the hub, rad/s, below which dry friction is smoothed: tanh(ω/eps) replaces the sign of the rate ω.
     eps: f64,
 }
 

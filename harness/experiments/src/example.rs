@@ -40,8 +40,9 @@ fn swell(t: f64) -> f64 {
     (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0)
 }
 
-/// The examples, one for each FMU. A thrust of 2340 N accelerates the default craft with its liquid, 1562 kg, by 1.5 m/s²,
-/// for which the damping of its tank is valid.
+/// The examples, one for each FMU. Each input has a name, a largest value and a shape over time. The 2340 N for
+/// Spacecraft accelerate the default craft with its liquid, 1562 kg, by 1.5 m/s², because the damping of its tank is
+/// valid at this acceleration.
 pub const EXAMPLES: [Example; 3] = [
     Example { model: "HubSlosh", inputs: &[(TAU_CMD, 0.1, BENCH)] },
     Example {

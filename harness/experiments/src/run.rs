@@ -75,10 +75,12 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
 /// [`TORQUE`] until the next row, N·m/s.
 pub const SLOPE: &str = "tau_slope";
 
-/// Reads histories of inputs from a file: every column that is an input of the FMU, and [`SLOPE`] together with
-/// [`TORQUE`]. Integers, enumerations (by value) and Booleans (true and false, or 1 and 0) are held from row to row.
-/// Other columns except `time` are an error, unless `ignore` is true. The first returned history is the input
-/// `chosen`, otherwise [`TORQUE`], otherwise the first input in the file. `done` receives messages about the units in
+/// Reads histories of inputs from a file. Each column must be the `time` or have the name of an input of the FMU;
+/// [`SLOPE`] may accompany [`TORQUE`]. Other columns are an error, unless `ignore` is true.
+///
+/// The first returned history is the input `chosen`, otherwise [`TORQUE`], otherwise the first input in the file.
+/// Reals are held from row to row if `held` is true, and otherwise interpolated linearly. Integers, enumerations (as
+/// numbers) and Booleans (true and false, or 1 and 0) are always held. `done` receives messages about the units in
 /// which the columns are read.
 ///
 /// # Errors
@@ -258,9 +260,9 @@ impl Run {
         Ok((histories, schedule))
     }
 
-    /// Returns the torque as the run passes it to the FMU: at every communication point `time` (s), `tau_cmd` (N·m) and
-    /// `tau_slope`, its derivative until the next point (N·m/s). The returned schedule contains the points that are
-    /// rows of the result.
+    /// Returns the torque as the run passes it to the FMU. The table has a row for every communication point, with
+    /// `time` (s), `tau_cmd` (N·m) and `tau_slope`, the derivative of `tau_cmd` until the next point (N·m/s). The
+    /// schedule states which of the communication points are rows of the result.
     ///
     /// # Errors
     /// If the profile takes too many commands.
@@ -346,8 +348,8 @@ impl Run {
         Ok(instance)
     }
 
-    /// Adds to `columns` those variables of `needs` that have to be recorded in addition, each only once. Time and the
-    /// driven inputs are in the table anyway.
+    /// Returns `columns`, followed by the variables of `needs` that the table of the run would otherwise lack, each
+    /// once. Time and the inputs that the run sets are always in the table.
     pub fn columns_with<'n>(
         &self,
         columns: &[&'n str],
@@ -366,10 +368,11 @@ impl Run {
         all
     }
 
-    /// Steps an initialised instance to the stop time, with a communication point at every row of an input and of the
-    /// result. The table has `time`, the driven inputs and the variables `columns` every [`Run::step`] seconds;
-    /// [`schedule::ROWS`] explains which values of inputs and outputs are in the same row. `progress` receives the
-    /// number of rows since its last call.
+    /// Simulates an initialised instance to the stop time. Every row of an input and every row of the result is a
+    /// communication point. The returned table has a row every [`Run::step`] seconds, with the columns `time`, the
+    /// inputs for which the run has a torque or a history, and the variables `columns`. [`schedule::ROWS`] explains
+    /// which values of inputs and outputs are in the same row. `progress` receives the number of rows since its last
+    /// call.
     ///
     /// # Errors
     /// If the FMU refuses a call, or a recorded value is not finite.

@@ -80,9 +80,14 @@ impl std::fmt::Display for Weightless {
     }
 }
 
-/// A tank of Spacecraft or SloshTank: the prefix of its variables' names (`tank[1]`, `tank`), the hinge of mode 1 relative
-/// to the point O, m, and the direction out of the liquid, both in the axes of the craft, and the wall elevation per slosh
-/// angle of each mode, m. `has_ball` is true if the FMU can model detached liquid, but does not in this tank.
+/// A tank of Spacecraft or SloshTank. Vectors are in the axes of the craft.
+///
+/// - `name`: first part of the names of its variables, for example `tank[1]`.
+/// - `hinge`: hinge of the pendulum of mode 1 relative to the craft's reference point O, m.
+/// - `upwards`: unit vector from the bottom of the tank to the surface of the liquid.
+/// - `wave`: for each mode, height of the wave at the wall divided by the slosh angle, m.
+/// - `has_ball`: true if the FMU could simulate the detached liquid of this tank, but the parameter `ball.travel` is
+///   0.
 #[derive(Clone, Debug)]
 struct Tank {
     name: String,
@@ -93,8 +98,9 @@ struct Tank {
     has_ball: bool,
 }
 
-/// The tanks of Spacecraft or SloshTank in which only weight holds the liquid at the bottom. `accelerometer` is the
-/// variable of the specific force at O: `specific_force`, or SloshTank's input `a`.
+/// The tanks of Spacecraft or SloshTank whose liquid no stiffness holds at the bottom, but only its weight.
+/// `accelerometer` is the variable of the specific force at the craft's reference point O: the output
+/// `specific_force` of Spacecraft, or the input `a` of SloshTank.
 #[derive(Clone, Debug)]
 pub struct Tanks {
     tanks: Vec<Tank>,
@@ -106,12 +112,12 @@ fn components(name: &str) -> [String; 3] {
 }
 
 impl Tanks {
-    /// Reads the tanks of an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
+    /// Reads the tanks from an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
     ///
-    /// The density is the tank's `density`. The radius is half of the tank's `diameter`, or the radius R = wave (ξ² − 1)/2
-    /// of the cylinder with an equally high wave. The surface `tension` is in N/m; the six-axis FMUs do not have this
-    /// parameter. Tanks without modes, with unknown dimensions (`wave` = 0), and tanks whose liquid is held by a stiffness
-    /// k are left out.
+    /// `tension` is the surface tension, N/m, which is no parameter of these FMUs. A tank whose `diameter` is 0 is
+    /// treated as an upright cylinder, whose radius R follows from its wave height per slosh angle: wave = 2 R/(ξ² −
+    /// 1). Three kinds of tanks are left out: tanks without modes, tanks of unknown dimensions (`wave` = 0), and
+    /// tanks whose liquid is held by a stiffness.
     ///
     /// # Errors
     /// If the tension is not positive, or a variable cannot be read.
@@ -215,8 +221,10 @@ impl Tank {
         modes.flat_map(|n| [1, 2].map(|i| format!("{}.p_dot[{n},{i}]", self.name))).collect()
     }
 
-    /// Describes in which way weight does not dominate the liquid in this tank. The specific force along the axis at the
-    /// hinge of mode 1 is f_O + ω' × ρ + ω × (ω × ρ); the speed of the surface at the wall is summed over all modes.
+    /// Returns a sentence if weight fails to dominate the liquid of this tank in at least one row of `table`.
+    /// `accelerometer` is the variable of the specific force f_O at the craft's reference point O. At the hinge of
+    /// mode 1, whose position relative to O is ρ, the specific force is f_O + ω' × ρ + ω × (ω × ρ); its component
+    /// along the axis of the tank counts as weight. The speed of the surface at the wall is the sum over all modes.
     fn without_weight(&self, table: &Table, accelerometer: &str) -> Option<String> {
         let column = |name: &String| table.column(name);
         let vector = |name: &str| {
@@ -269,8 +277,8 @@ mod tests {
 
     const WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
 
-    /// Returns a tank with a radius of 0.45 m at 1 m along x, with its axis along y (a quarter turn about -x) and its hinge
-    /// 0.5 m up that axis.
+    /// Returns a tank at x = 1 m with a radius of 0.45 m. Its axis is parallel to y, because it is turned by 90°
+    /// about −x, and its hinge is 0.5 m above its origin along this axis.
     fn tank(has_ball: bool) -> Tanks {
         let upwards = third_axis([1.0, -1.0, 0.0, 0.0]);
         assert_eq!(upwards, [0.0, 1.0, 0.0]);
@@ -338,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weightless_liquid_is_reported_with_its_smallest_bond_number() {
+    fn a_liquid_that_weight_does_not_hold_is_reported_with_the_smallest_bond_number() {
         // water in the bench's tank
         let contents = Contents { liquid: WATER, radius: 0.0815 };
         let numbers = |rows: &[(f64, f64)]| contents.without_weight(rows.iter().copied());

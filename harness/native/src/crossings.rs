@@ -267,8 +267,8 @@ struct Root {
     is_zero: bool,
     /// Distance of the root from the stability boundary: the imaginary axis, or the unit circle of a sampled model.
     axis: f64,
-    /// Two factors for bounds of the second derivative of ln L: the first one is divided by the square and the second one by the
-    /// cube of the distance from the root.
+    /// Factors of two bounds of the second derivative of ln L. At a point whose distance from the root is d the
+    /// bounds are `bends[0]`/d² and `bends[1]`/d³.
     bends: [f64; 2],
 }
 
@@ -286,21 +286,22 @@ impl Root {
     }
 }
 
-/// A zero of the loop gain and its partner, the nearest pole without another partner. If the two are close, they nearly
-/// cancel in ln L, and the bound of the curvature is much smaller than the bound for two separate roots.
+/// A zero of the loop gain and the nearest pole that is not paired with another zero. If they are close to each
+/// other, their effects on ln L nearly cancel. The common bound of their curvature is then much smaller than the sum
+/// of two separate bounds.
 struct Pair {
     /// Number of roots in the pair: 2 for a zero with its pole, 1 for a zero or a pole without a partner.
     roots: usize,
-    /// Half the distance between zero and pole, and the factor of the joint bound of the curvature, which is divided by the cube
-    /// of the distance from them.
+    /// Half the distance between zero and pole. The common bound of the curvature of both is `steep` divided by the
+    /// cube of the distance from them.
     half_gap: f64,
     steep: f64,
 }
 
 /// A rational function, given by its poles, its zeros and a constant factor.
 struct Shape {
-    /// Poles and zeros of the function in the order of `pairs`: first both roots of each pair, then
-    /// the roots without a partner.
+    /// Poles and zeros of the function. The roots of the first entry of `pairs` come first, then the roots of the
+    /// second entry, and so on.
     roots: Vec<Root>,
     pairs: Vec<Pair>,
     /// Constant factor of the function: logarithm of its magnitude, and its phase, rad.
@@ -522,8 +523,9 @@ enum Look {
 }
 
 impl Logarithm {
-    /// Decides how many crossings of this kind the interval within `half` of the evaluated frequency can contain. `high` is the
-    /// upper end of the whole search range, relative to which very short intervals are no longer halved.
+    /// Returns how many crossings of this `kind` are possible at frequencies that differ by at most `half` from the
+    /// frequency at which this logarithm was evaluated. `high` is the highest frequency of the search; an interval
+    /// that is very short compared with it is not halved further.
     fn look(&self, kind: Kind, half: f64, high: f64) -> Look {
         let Logarithm { value, slope, curvature } = *self;
         let reach = (slope[0].abs() + curvature[0] * half / 2.0) * half + SLACK;

@@ -108,7 +108,6 @@ impl Wheel {
     }
 }
 
-/// The wheels of a run, and the input of the FMU through which they act on the craft.
 struct Wheels {
     each: Vec<Wheel>,
     references: [u32; 3],

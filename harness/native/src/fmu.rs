@@ -253,8 +253,9 @@ impl Fmu {
         self.description.derivatives.clone()
     }
 
-    /// Convert a value to the type and the unit of a variable, as `Instance.set` receives it. `unit` is the unit of the value;
-    /// `base` is the definition of the unit by SI base units, if it is not one of the variable's units.
+    /// Convert `value` to the type and the unit of the variable `name`, as `Instance.set` expects it. `unit` is the
+    /// name of the value's unit; None means the variable's unit. `base` defines this unit by SI base units, so that a
+    /// unit that the FMU does not list can be used.
     #[pyo3(signature = (name, value, unit=None, base=None))]
     fn convert(
         &self,

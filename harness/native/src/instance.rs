@@ -192,14 +192,17 @@ impl Instance {
         })
     }
 
-    /// Simulate a run with a communication point at each time in `rows`, and record `outputs` at each of them.
+    /// Simulate a run with a communication point at each row, and record `outputs` in each row.
     ///
-    /// `rows` has the times (s), and None or a byte for each row, which is 0 if the row only repeats the outputs of the row before.
-    /// `inputs` and `outputs` are pairs of a list of names and a table of floats with one column for each name, also for Booleans
-    /// and enumerations. `slopes` has the derivatives of the inputs after each row, or is None.
+    /// - `rows`: times of the rows, s, and None or one byte for each row. A byte 0 means that the outputs of this row
+    ///   are not read, but copied from the row before.
+    /// - `inputs`, `outputs`: a list of names, and a table of floats with one column for each name, also for Booleans
+    ///   and enumerations.
+    /// - `slopes`: derivatives of the inputs after each row, or None.
+    /// - `feedback`: object of the Python class `Feedback`, whose controller acts during the run, or None.
     ///
-    /// Return None if the run reached its end. Otherwise return where and why the FMU stopped: the row, the number of rows that
-    /// were recorded, and a sentence.
+    /// Return None if the run reached its end. Otherwise return the row in which the FMU stopped, the number of
+    /// recorded rows, and a sentence with the reason.
     fn run(
         &self,
         py: Python,
@@ -235,8 +238,9 @@ impl Instance {
         })
     }
 
-    /// Initialise the instance in Model Exchange, and return the derivatives of `unknowns` with respect to each of `knowns` as the
-    /// bytes of 64-bit floats, known after known; both are lists of value references.
+    /// Initialise the instance in Model Exchange, and return derivatives as the bytes of 64-bit floats: the
+    /// derivatives of all `unknowns` with respect to the first of `knowns`, then with respect to the second one, and
+    /// so on. Both arguments are lists of value references.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -267,11 +271,13 @@ impl Instance {
     }
 }
 
-/// Returns the derivatives of `unknowns` with respect to each of `knowns`, known after known.
+/// Returns the derivatives of all `unknowns` with respect to the first of `knowns`, then with respect to the second
+/// one, and so on.
 ///
-/// Most states of a small craft belong to tanks that it does not have. Therefore the derivative in a direction that moves all
-/// knowns which had no effect in the last Jacobian of this FMU is requested first: if this derivative is 0, the columns of all
-/// these knowns are 0. `effective` has the value references of the other knowns; it is updated.
+/// Most knowns have no effect, because most states of a small craft belong to tanks that it does not have.
+/// `effective` has the value references of the knowns that had an effect in the last Jacobian of this FMU, and is
+/// updated. All other knowns are first changed together: if no unknown changes, their derivatives are 0 and need no
+/// further calls.
 fn jacobian(
     instance: &mut fmu::Instance,
     unknowns: &[u32],

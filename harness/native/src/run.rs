@@ -21,11 +21,9 @@ const SILENCE: Duration = Duration::from_millis(100);
 /// Variables that form the columns of a table. Reals are read or set with one call of the FMU, variables of other types with one
 /// call each.
 struct Columns<'fmu> {
-    /// Reals: their value references, the columns to which they belong, and working memory for their values.
     references: Vec<u32>,
     places: Vec<usize>,
     reals: Vec<f64>,
-    /// Variables of other types, each with the column to which it belongs.
     others: Vec<(&'fmu Variable, usize)>,
     row: Vec<f64>,
 }
@@ -65,7 +63,8 @@ impl<'fmu> Columns<'fmu> {
         if self.others.is_empty() { &self.reals } else { &self.row }
     }
 
-    /// Sets inputs to the values of `row`. If `are_held`, Reals that have not changed since the last row are not set again.
+    /// Sets the inputs to the values in `row`. `are_held` is true if inputs are constant until the next row; Reals
+    /// that have not changed are then not set again.
     fn set(&mut self, to: &mut Instance, row: &[f64], are_held: bool) -> Called {
         let mut is_new = !are_held;
         for (place, real) in self.places.iter().zip(&mut self.reals) {
@@ -89,7 +88,7 @@ impl<'fmu> Columns<'fmu> {
 /// Description of a run that the FMU ended: the row, the number of rows that were recorded, and the reason.
 pub type Stop = (usize, usize, String);
 
-/// A table of the Python side: the names of its columns, and the numpy array.
+/// Names of columns, and a numpy array with one column of floats for each name.
 pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 
 /// The Reals that change linearly from one row to the next: value references, values at the row, and derivatives. This
@@ -104,8 +103,8 @@ struct Lines {
 pub struct Run<'fmu> {
     time: Vec<f64>,
     /// For each row true if its outputs are read; `None` if the outputs of all rows are read. A row that is not read
-    /// repeats the outputs of the previous row. Rows are not read if possible, because reading can make the FMU
-    /// compute all its outputs.
+    /// repeats the outputs of the row before. As few rows as possible are read, because the FMU may have to compute
+    /// all its outputs for one read.
     wanted: Option<Vec<bool>>,
     inputs: (Columns<'fmu>, Numbers),
     slopes: Option<Numbers>,
@@ -247,7 +246,8 @@ impl<'fmu> Run<'fmu> {
         Ok(())
     }
 
-    /// Exchanges rows with the numpy arrays, and handles signals such as Ctrl-C.
+    /// Writes the computed rows into the numpy arrays of Python, and reads the next rows of inputs from them. Fails
+    /// if the user has pressed Ctrl-C.
     fn visit(&mut self, py: Python) -> PyResult<()> {
         self.hand_over(py);
         self.inputs.1.read(py, ROWS);

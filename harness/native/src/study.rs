@@ -75,8 +75,8 @@ impl Store {
         Ok(Store(Mutex::new(Some(store.map_err(error)?))))
     }
 
-    /// Return the bytes of a stored run of a study, or None, and the reason why the bytes on the disk are not those that were
-    /// stored, or None. Both are None if the run was never stored.
+    /// Return the bytes of a stored run, and a text that says why they are damaged. The text is None if they are the
+    /// bytes that were stored. The bytes are None if the run was never stored or its file cannot be read.
     fn read<'py>(
         &self,
         py: Python<'py>,

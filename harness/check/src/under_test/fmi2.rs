@@ -20,7 +20,8 @@ const ITERATIONS: usize = 100;
 /// Largest number of events that may follow each other at the same time. An FMU that always requests the next event
 /// at once breaks a rule.
 const IMMEDIATE: usize = 3;
-/// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
+/// Largest number of events in a session before and after which all values are compared. Only events that
+/// fmi2CompletedIntegratorStep requests, without a time event or a crossing, are compared.
 const ASKED: usize = 20;
 /// Relative change of a state at an event below which the change counts as rounding.
 const JUMP: f64 = 1e-9;
@@ -32,15 +33,14 @@ pub struct Notes {
     /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
     pub past_event: Option<(f64, f64)>,
     immediate_events: usize,
-    /// Results of the last event iteration: whether states, and whether their nominals, have changed.
     values_changed: bool,
     pub nominals_changed: bool,
     /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
     /// index, and both values.
     pub hidden_jump: Option<(f64, usize, f64, f64)>,
     asked: usize,
-    /// The first event requested only by fmi2CompletedIntegratorStep that has changed a value: time, name, and
-    /// both values as text.
+    /// The first variable that changed in an event which only fmi2CompletedIntegratorStep had requested: time of the
+    /// event (s), name of the variable, and its old and new value, for example `1 to 2`.
     pub step_event: Option<(f64, String, String)>,
 }
 

@@ -9,7 +9,8 @@ use crate::description::Variable;
 
 /// Relative change of a value at an event below which the change counts as rounding.
 const ROUNDING: f64 = 1e-9;
-/// Relative change of a derivative at an event below which it may come from an iterative solver.
+/// Relative change of a derivative below which an event counts as not having changed it, because the error of an
+/// iterative solver in the FMU can have this size.
 const ITERATED: f64 = 1e-2;
 
 pub struct Observed {

@@ -150,7 +150,7 @@ pub fn type_mismatch(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for v in subject.readable() {
         let n = v.length();
         let place = format!("reading {} by the call of another type", v.name);
-        let (call, answer) = subject.with_open_effect(place, findings, || match v.c_type {
+        let (call, answer) = subject.with_undefined_effect(place, findings, || match v.c_type {
             CType::Float64 => {
                 ("fmi3GetInt32", session.instance.get_numbers(&[v.reference], &mut vec![0i32; n]))
             }
@@ -195,7 +195,7 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
         for told in [n, n.saturating_sub(1)] {
             let place = format!("fmi3GetFloat64 of {} with nValues = {told}", v.name);
             let mut values = vec![CANARY; n + 8];
-            let answer = subject.with_open_effect(place, findings, || {
+            let answer = subject.with_undefined_effect(place, findings, || {
                 session.instance.get_numbers(&[v.reference], &mut values[..told])
             });
             if values[told..].iter().any(|x| x.to_bits() != CANARY.to_bits()) {
@@ -248,7 +248,7 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
             .map(|x| if let Value::Real(x) = x { x + 0.125 * v.nominal() } else { 0.0 })
             .collect();
         let place = format!("setting the fixed parameter {} after initialisation", v.name);
-        let set = subject.with_open_effect(place, findings, || {
+        let set = subject.with_undefined_effect(place, findings, || {
             session.instance.set_numbers(&[v.reference], &moved)
         });
         if set.is_ok() && session.read(v)? != before {

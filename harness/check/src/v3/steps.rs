@@ -135,7 +135,8 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
     session.advance(1)?;
     let place = "fmi3DoStep with a communicationStepSize below 0";
     let (time, h) = (session.time, -session.step);
-    if subject.with_open_effect(place, findings, || session.instance.do_step(time, h)).is_ok() {
+    if subject.with_undefined_effect(place, findings, || session.instance.do_step(time, h)).is_ok()
+    {
         findings.at(place).add("the call returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
@@ -553,8 +554,8 @@ impl Difference {
         Difference { quotient: (above - below) / (2.0 * h), rounding }
     }
 
-    /// Returns true if `derivative`, which the FMU computes, agrees with the finite difference to within rounding,
-    /// curvature and the error `unsure`.
+    /// Returns true if `derivative`, which the FMU computes, equals the difference quotient except for rounding
+    /// errors, a relative error of 1e-4, and the estimated error `unsure` of the quotient.
     fn is_near(&self, derivative: f64, unsure: f64) -> bool {
         let size = self.quotient.abs().max(derivative.abs());
         (derivative - self.quotient).abs() <= 1e-4 * size + self.rounding + unsure + 1e-9
@@ -672,9 +673,8 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if the value `after` a change of a known differs from the value `before` by more than rounding. Terms
-/// that cancel in exact arithmetic may leave a few units in the last place. The known is changed by at least a
-/// hundredth of its magnitude.
+/// Returns true if a value has changed by more than a few units in its last place. Such small changes come from
+/// rounding, for example if two terms cancel.
 fn follows(after: f64, before: f64) -> bool {
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let same = after.to_bits() == before.to_bits()

@@ -51,7 +51,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     assert!(format!("{refused:#}").contains("friction.b = -1"), "{refused:#}");
 }
 
-/// Faults of the shim around our binary, each with the rule that must find it.
+/// Faults that the library shim.c adds to the binary of HubSlosh, each with the rule that must report the fault.
 const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("crashes_when_loaded", "load.opens"),
     ("types_platform", "load.types_platform"),
@@ -166,7 +166,7 @@ fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_not() {
+fn a_wrong_answer_is_an_error_and_a_crash_in_a_call_with_undefined_effect_is_a_warning() {
     for (word, rule, meant) in [
         ("opposite_slopes", "steps.output_derivatives", Severity::Error),
         ("true_is_two", "values.booleans", Severity::Error),
@@ -211,8 +211,8 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     assert!(finding.text.contains("have not ended after 4 s"), "{}", finding.text);
 }
 
-/// Changes of modelDescription.xml: name | the text after which | the text that | is replaced by | the rule that
-/// must find the change.
+/// Faults in modelDescription.xml. The cells of a line are: name of the case, text that precedes the change, old
+/// text, new text, and the rule that must report the fault.
 const WORDS: &str = r#"
 another start | name="hub.I" | start="0.322414" | start="0.322415" | values.start
 a min that is refused | name="hub.I" | min="1e-6" | min="-1" | values.limits

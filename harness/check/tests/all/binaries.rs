@@ -11,7 +11,6 @@ use crate::common::{
     binary, breaks, broken_rules, changed, check_bytes, check_rules, our_files, with, zipped,
 };
 
-/// The FMU is a plain build for this machine, so that the rule on system libraries may find something.
 #[test]
 fn our_own_fmu_breaks_no_rule() {
     let report = check_rules(packed_for_tests(), &[], 120.0);

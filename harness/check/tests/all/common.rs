@@ -92,7 +92,8 @@ pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     writeln!(index.unwrap(), "{file}\t{}\t{}", name.escape_debug(), rules.join(" ")).unwrap();
 }
 
-/// Asserts that each FMU breaks exactly the rules that are listed for it; only rules in `groups` count.
+/// Asserts that each FMU breaks exactly the rules that are listed for it. Rules outside of `groups` are not checked.
+/// An entry of `mutants` has the name of the case, the bytes of the FMU, and its broken rules.
 pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {
@@ -126,9 +127,10 @@ pub fn cases<const N: usize>(table: &str) -> Vec<[&str; N]> {
     lines.map(|line| cells(line).unwrap_or_else(|_| panic!("not {N} cells: {line}"))).collect()
 }
 
-/// Asserts that each changed description breaks exactly the rules of the group `xml` that its line lists. The cells of a line
-/// are: name of the case, the text after which the change is, the text that is replaced, its replacement, and the rules.
-pub fn words_break(table: &str) {
+/// Asserts that each fault in modelDescription.xml breaks exactly the listed rules of the group `xml`. The cells of a
+/// line of `table` are: name of the case, text that precedes the change, old text, new text, and the names of the
+/// rules.
+pub fn assert_description_faults(table: &str) {
     let cases = cases::<5>(table);
     let rules: Vec<Vec<&str>> = cases.iter().map(|case| case[4].split(' ').collect()).collect();
     let mutants = cases

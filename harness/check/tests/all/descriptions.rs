@@ -6,8 +6,8 @@ use check::{RULES, Severity};
 use zip::CompressionMethod;
 
 use crate::common::{
-    XML, breaks, broken_rules, changed, check_bytes, our_fmu_with_description, with, words_break,
-    xml, zipped,
+    XML, assert_description_faults, breaks, broken_rules, changed, check_bytes,
+    our_fmu_with_description, with, xml, zipped,
 };
 
 /// Returns a DOCTYPE that defines ten entities. Each of them expands to ten times the entity before it, which makes 10^10
@@ -46,7 +46,7 @@ fn xml_nested_200_000_levels_deep_is_refused_as_too_deep() {
 
 #[test]
 fn faults_of_the_file_and_its_elements_break_the_intended_rules() {
-    words_break(
+    assert_description_faults(
         r#"
 not well-formed | </ModelVariables> | </ModelVariables> |  | xml.well_formed
 Latin-1 | <?xml | encoding="UTF-8" | encoding="ISO-8859-1" | xml.encoding
@@ -70,7 +70,7 @@ an external entity | <fmiModelDescription | <fmi | <!DOCTYPE a [<!ENTITY b SYSTE
 
 #[test]
 fn faults_of_interfaces_and_experiment_break_the_intended_rules() {
-    words_break(
+    assert_description_faults(
         r#"
 no C identifier | <CoSimulation | "HubSlosh" | "Hub-Slosh" | xml.model_identifier
 serialize without get | <CoSimulation | canGetAndSetFMUstate="true" | canGetAndSetFMUstate="false" | xml.capabilities xml.state_capability
@@ -86,7 +86,7 @@ a category twice | <Category name="logStatusError" | logStatusError | logEvents 
 
 #[test]
 fn faults_of_units_and_types_break_the_intended_rules() {
-    words_break(
+    assert_description_faults(
         r#"
 an inverted display factor | <DisplayUnit name="deg" | 57.29577951308232 | 0.0174532925199433 | xml.display_units
 a display unit of something else | <DisplayUnit name="mm2/s" | name="mm2/s" | name="mm2" | xml.display_units xml.units
@@ -103,7 +103,7 @@ an undefined type | name="slosh.model" | declaredType="SloshModel" | declaredTyp
 
 #[test]
 fn faults_of_names_and_causalities_break_the_intended_rules() {
-    words_break(
+    assert_description_faults(
         r#"
 a name twice | name="omega" | name="omega" | name="theta" | xml.names
 an unstructured name | name="hub.I" | hub.I | hub..I | xml.structured_names
@@ -120,7 +120,7 @@ multiple set of a parameter | name="hub.I" | causality | canHandleMultipleSetPer
 
 #[test]
 fn faults_of_start_values_and_ranges_break_the_intended_rules() {
-    words_break(
+    assert_description_faults(
         r#"
 calculated with start | name="theta" | displayUnit="deg" | displayUnit="deg" start="0" | xml.start
 a parameter without start | name="hub.I" |  start="0.322414" |  | xml.start
@@ -135,7 +135,7 @@ min above max | name="tank.d" | min="0.001" | min="1000" | xml.range
 
 #[test]
 fn faults_of_the_model_structure_break_the_intended_rules() {
-    words_break(
+    assert_description_faults(
         r#"
 a shared reference | name="tau_ext" | valueReference="13" | valueReference="12" | xml.aliases
 a derivative of nothing | name="der(omega)" | derivative="2" | derivative="9999" | xml.states xml.dependencies_known
@@ -170,7 +170,7 @@ fn malicious_xml_and_elements_out_of_order_break_the_intended_rules() {
 }
 
 #[test]
-fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
+fn missing_repeated_and_misplaced_entries_of_the_model_structure_are_reported() {
     let [outputs, derivatives, initial] = ["<Outputs>", "<Derivatives>", "<InitialUnknowns>"];
     let without = |list| changed(list, &line(list, 0), "");
     let twice = |list| changed(list, &line(list, 0), &line(list, 0).repeat(2));
@@ -209,7 +209,7 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
 /// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is, but only the list Derivatives makes
 /// that variable a state (2.2.8). Dymola and JModelica write the attribute also for outputs, inputs and dummy derivatives.
 #[test]
-fn the_attribute_derivative_by_itself_makes_no_state() {
+fn a_variable_is_a_state_only_if_the_list_derivatives_names_its_derivative() {
     let of = |variable: &str, index: &str| {
         let derivative = format!("<Real derivative=\"{index}\"");
         changed(&format!("name=\"{variable}\""), "<Real", &derivative)

@@ -16,7 +16,8 @@ fn binary() -> String {
     format!("binaries/{PLATFORM}/Model3{}", std::env::consts::DLL_SUFFIX)
 }
 
-/// Returns the files of the FMU of model3.c with one fault, whose number replaces the zeros of "MUTANT=00" in the library.
+/// Returns the files of an FMU whose library, compiled from model3.c, has the fault with the number `mutant`. The
+/// number replaces the zeros of the text "MUTANT=00" in the library.
 fn files(mutant: u32) -> Files {
     let mut library = compiled("model3.c", &[]);
     let at = library.windows(9).position(|bytes| bytes == b"MUTANT=00").unwrap();

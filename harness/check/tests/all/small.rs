@@ -123,7 +123,7 @@ fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
-fn correct_fmus_get_no_finding_whatever_their_experiment() {
+fn correct_fmus_get_no_finding_whatever_their_step_size() {
     let long = "startTime=\"0\" stopTime=\"1e6\" stepSize=\"1000\"";
     get_no_finding(&[
         ("both interfaces", BOTH, 1.0, USUAL),
@@ -227,8 +227,8 @@ fn an_fmu_that_crashes_in_every_step_gets_a_single_finding() {
     assert!(because.count() > 15, "{}", report.text());
 }
 
-/// Each case comes from a public FMU for which either several rules had reported one fault, or the FMU could rightly refuse a
-/// value that the check sets.
+/// The cases imitate public FMUs. Some of them have one fault that could be reported by several rules; others refuse,
+/// as the standard allows, a value that the check sets.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_fault_is_reported_by_its_own_rule_with_its_severity() {

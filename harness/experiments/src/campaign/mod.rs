@@ -47,9 +47,9 @@ use crate::rest;
 use crate::run::Run;
 use crate::sensors::Sensors;
 
-/// Columns of a stored run of the bench, SI units, at every communication point from the torque's start to the stop time.
-/// Other columns may follow. The first six are for plots; wave height, energy, work, dissipated energy, stuck time and the
-/// liquid's force on the tank are for the tables.
+/// Columns of a stored run of HubSlosh, in SI units. Each communication point from the beginning of the torque to the
+/// stop time is a row. Other columns may follow. The first six are for plots; wave height, energy, work, dissipated
+/// energy, time in stiction and the liquid's force on the tank are for the tables.
 pub const STORED: [&str; 13] = [
     "time",
     TAU_CMD,
@@ -80,8 +80,8 @@ pub fn is_slosh_angle(name: &str) -> bool {
     name.starts_with("tank") && (name.contains(".angle_x[") || name.contains(".angle_y["))
 }
 
-/// Lists the stored columns of a run: [`STORED`] for the bench; otherwise time, the driven input and every
-/// numeric output.
+/// Lists the columns of a stored run: [`STORED`] for HubSlosh. For other FMUs they are the time, the input that the
+/// torque drives (`input`), every numeric output, and the slosh angles.
 pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
@@ -130,8 +130,9 @@ pub struct Failure {
     pub reason: String,
 }
 
-/// A run of an FMU that is not the bench, with its stored columns. The columns are thinned, except their last rows in
-/// `tail`, and empty for most runs of a large campaign ([`keeps_curves`]).
+/// A run of an FMU other than HubSlosh. Its stored columns are plotted, but no frequency response is estimated.
+/// `history` contains all rows in a thinned form, and `tail` the last rows in full. Both are empty for most runs of a
+/// large campaign ([`keeps_curves`]).
 #[derive(Clone, Debug)]
 pub struct Unanalysed {
     pub case: Case,
@@ -481,9 +482,10 @@ impl Campaign {
         })
     }
 
-    /// Returns the tables with their names: `features.csv`, and `features_spa.csv` and `features_h1.csv` with the same
-    /// columns from the `spa` and H1 responses. `runs.csv` contains every run, also failed ones, with its settings and all
-    /// features. If the plan has no run of the bench, there is only `runs.csv`.
+    /// Returns the tables of a campaign as pairs of a file name and the bytes of a CSV file. `features.csv` contains
+    /// the antiresonance and resonance of each analysed run; `features_spa.csv` and `features_h1.csv` contain them
+    /// from the estimates `spa` and H1. `runs.csv` contains every run, also failed ones, with its settings and all
+    /// features. Only `runs.csv` exists if no run is of HubSlosh.
     pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let plan = sha256(self.plan.text.as_bytes());
         let Results { outcomes, unanalysed, failures } = results;

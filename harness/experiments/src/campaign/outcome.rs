@@ -41,9 +41,10 @@ const RESOLVED: f64 = 3.0;
 /// Largest residual of a fitted transfer function, relative to the rate, at which the fit counts as valid. With 0.3, a tenth
 /// of the power of the rate does not follow from the torque.
 const MOST_MISFIT: f64 = 0.3;
-/// Largest shift of the resonance by a passing sweep, relative to the separation of antiresonance and resonance, at which the
-/// estimate counts as valid; also the largest difference of the resonances in two estimates from a whole record, relative to
-/// the separation. If the resonance is narrow, the shift is 0.6 times the square root of the sweep's rate in Hz/s.
+/// Limit of two frequency differences, as a fraction of the separation of antiresonance and resonance. A passing
+/// sweep may shift the resonance by this fraction; if the resonance is narrow, the shift in Hz is 0.6 times the
+/// square root of the sweep's rate in Hz/s. Antiresonances or resonances from two estimates of one record may differ
+/// by this fraction. Beyond the limit an estimate is not valid.
 const MOST_SHIFT: f64 = 0.25;
 
 const LEAST_SNR: f64 = 0.0;
@@ -355,9 +356,9 @@ pub enum Doubt {
     TooFast,
     TooShort,
     Noise,
-    /// Two estimates of one linear response differ by more than a quarter of the separation. After a fast
-    /// sweep a nonlinear liquid oscillates freely, at a frequency that depends on its amplitude. No linear
-    /// response to the torque represents this motion.
+    /// Two estimates of the response differ by more than a quarter of the separation of antiresonance and resonance,
+    /// because the motion is nonlinear. For example, after a fast sweep a nonlinear liquid oscillates freely, at a
+    /// frequency that depends on its amplitude; this motion is not a linear response to the torque.
     Nonlinear,
 }
 
@@ -373,8 +374,8 @@ impl std::fmt::Display for Doubt {
 }
 
 impl Estimate {
-    /// Creates an estimate from a response with its features between two frequencies, Hz. `doubt` returns the reason to
-    /// reject the features, if there is one.
+    /// Creates an estimate from a response. Its antiresonance and resonance are sought between the two frequencies
+    /// `inner`, Hz. `doubt` returns the reason to reject them, if there is one.
     fn new(
         response: FrequencyResponse,
         inner: (f64, f64),
@@ -388,8 +389,9 @@ impl Estimate {
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
-    /// Adds the uncertainties of the response and of its features. For a frequency, `slope` returns how fast the response's
-    /// error changes with the frequency, relative to the error, 1/Hz.
+    /// Adds the standard deviations of the response, `deviation`, and the standard deviations of antiresonance and
+    /// resonance that follow from them. `slope` maps a frequency, Hz, to the rate at which the response's error
+    /// changes with the frequency, relative to the error, 1/Hz.
     fn with_uncertainties(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }
@@ -406,10 +408,9 @@ impl Estimate {
     }
 }
 
-/// Returns true if the separation of antiresonance and resonance is less than `than`, Hz. Returns false if antiresonance
-/// or resonance is missing.
-fn closer(features: &Features, than: f64) -> bool {
-    features.delta_f().is_some_and(|delta| delta < than)
+/// Returns true if antiresonance and resonance exist and are less than `limit` (Hz) apart.
+fn are_closer(features: &Features, limit: f64) -> bool {
+    features.delta_f().is_some_and(|delta| delta < limit)
 }
 
 /// Averages each group of `count` consecutive samples. An incomplete group at the end is left out.
@@ -450,9 +451,10 @@ pub struct Passing {
 }
 
 impl Record {
-    /// Estimates the frequency response from the whole record of torque `tau` (N·m) and rate `omega` (rad/s). If `enough` is
-    /// true, another estimate is already valid, so that no transfer function is fitted. `unexplained` is the power spectral
-    /// density of the rate that no linear response explains, at the frequencies of the responses.
+    /// Estimates the frequency response from the whole record of torque `tau` (N·m) and rate `omega` (rad/s), whose
+    /// rows are `step` seconds apart. `unexplained` is the power spectral density of the part of the rate that is no
+    /// linear response to the torque, at the frequencies of the responses. `enough` is true if a sweep has already
+    /// given a valid estimate, so that no transfer function need be fitted.
     fn estimate(
         profile: &Profile,
         step: f64,
@@ -472,7 +474,7 @@ impl Record {
         let snr = spectra.snr_db();
         let noisy = |features: &Features| {
             // details that the segments do not resolve look like noise
-            let resolved = !closer(features, RESOLVED / spectra.length);
+            let resolved = !are_closer(features, RESOLVED / spectra.length);
             resolved && features.f_res.is_some_and(|f| spectra.value_at(&snr, f) < LEAST_SNR)
         };
         let estimate = |response: FrequencyResponse, length: f64| {
@@ -480,7 +482,7 @@ impl Record {
             // the band is narrower by one resolution at either end, where the estimate oscillates because the band is cut off
             let inner = (band.0 + resolution, band.1 - resolution);
             Estimate::new(response, inner, resolution, |features| match features {
-                features if closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
+                features if are_closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
                 features if noisy(features) => Some(Doubt::Noise),
                 _ => None,
             })
@@ -527,8 +529,9 @@ impl Record {
 }
 
 impl Passing {
-    /// Estimates the frequency response at the moments at which the sweep passes each frequency, and finds rotary slosh.
-    /// `arm` is the distance of the tank from the axis, m. `unexplained` is as for [`Record`].
+    /// Estimates the frequency response at the moments at which the sweep passes each frequency, and finds rotary
+    /// slosh. `arm` is the distance of the tank from the hub's axis, m. `unexplained` is the power spectral density
+    /// of the part of the rate that is no linear response to the torque.
     fn demodulate(
         sweep: &Sweep,
         table: &Table,
@@ -599,7 +602,7 @@ impl Passing {
         let middle = sweep.band();
         let mut rate = Estimate::new(rate, inner, 0.0, |features| {
             let shift = |f: f64| 0.6 * sweep.rate_at(f).abs().sqrt();
-            let fast = features.f_res.is_some_and(|f| closer(features, shift(f) / MOST_SHIFT));
+            let fast = features.f_res.is_some_and(|f| are_closer(features, shift(f) / MOST_SHIFT));
             fast.then_some(Doubt::TooFast)
         })
         .with_uncertainties(deviation, |f| demodulation::slope(sweep, f));
@@ -615,8 +618,9 @@ pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary
     Rotary::from_angles(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
 }
 
-/// Returns the rate of the linear model under the torque of a run, in the rows of the result. For a sweep that was recorded,
-/// the recorded torque is used.
+/// Returns the rate of the hub, rad/s, that the exact linear model predicts in each row of a run. `recorded` is the
+/// torque in each row, N·m, and `start` the rate in the first row. The prediction uses `recorded` for a sweep, and
+/// the plan's history for other torques, because they may jump between two rows.
 fn modelled(
     run: &Run,
     case: &Case,
@@ -801,9 +805,12 @@ impl Outcome {
 
 pub const WAVE: &str = WAVE_HEIGHT;
 
-/// Quantities that determine the range of validity of a liquid's model: radius of the tank, m; fill, m (`None` if the modes
-/// come from a table, which does not state it); density and surface tension of the liquid; `g_axial` at the start, m/s²; and
-/// the pendulum length of mode 1, m (0 if nothing sloshes). `model` is the value of `slosh.model`.
+/// Quantities that determine in which runs the liquid's model is valid.
+///
+/// - `model`: value of `slosh.model`. `radius`: radius of the tank, m.
+/// - `fill`: depth of the liquid, m; `None` if the modes come from a table, which does not state the depth.
+/// - `liquid`: density and surface tension. `g`: value of `g_axial` at the start, m/s².
+/// - `length`: pendulum length of mode 1, m; 0 if nothing sloshes.
 #[derive(Clone, Debug)]
 pub struct Range {
     pub model: String,
@@ -815,7 +822,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// Reads these quantities from an initialised instance; `None` if the FMU is not the bench.
+    /// Reads the quantities of `Range` from an initialised instance; `None` if the FMU is not HubSlosh.
     pub fn read(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
         if !super::is_bench(description) {
             return Ok(None);
@@ -836,9 +843,13 @@ impl Range {
         }))
     }
 
-    /// Returns a sentence about the dominant force on the liquid, if this force is not gravity, at the smallest specific
-    /// force of a run with these wave heights, m. Bond, Weber and Froude numbers use the tank's radius and the highest speed
-    /// of the surface until then, V = η √(g/l) (thesis 2.5). `g` is `g_axial` at each row, m/s², if the run drives it.
+    /// Returns a sentence about the dominant force on the liquid, or `None` if gravity dominates in every row of the
+    /// run. `waves` are the wave heights in each row, m; `g` is the input `g_axial` in each row, m/s², or `None` if
+    /// it is constant.
+    ///
+    /// The sentence has the Bond, Weber and Froude numbers in the row in which gravity dominates least. They use the
+    /// tank's radius and the highest speed of the surface up to this row. For a wave height η and a pendulum length l
+    /// the speed is V = η √(g/l) (thesis 2.5).
     pub fn without_weight(&self, waves: &[f64], g: Option<&[f64]>) -> Option<String> {
         if self.length <= 0.0 {
             return None;
@@ -885,8 +896,8 @@ fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String
     Ok(found.map(|item| item.name.clone()))
 }
 
-/// Computes the linear model from the FMU's own calculated parameters, with viscous friction unless the FMU has none, and
-/// with the stiffness of the line on which the bench hangs.
+/// Computes the exact linear model of HubSlosh from the FMU's calculated parameters. It contains the viscous friction
+/// of the bearing, and the stiffness and the damping of the line on which the thesis's bench hangs.
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
     let arm = real(tank::R)?;
@@ -943,7 +954,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weightless_liquid_is_reported_with_its_numbers() {
+    fn a_liquid_that_weight_does_not_hold_is_reported_with_bond_weber_and_froude_number() {
         // water in the bench's tank, filled to 10 cm
         let range = Range {
             model: "spherical".into(),

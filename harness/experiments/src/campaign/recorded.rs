@@ -15,8 +15,8 @@ use signals::table::Table;
 use crate::plan::{Case, Recorded};
 use crate::profile::Torque;
 
-/// Signals that are read from a recording. The rows are those with a rate; the torque and the rates about the other
-/// axes are interpolated linearly.
+/// Signals that are read from a recording. Rows without a rate about the hub's axis (`omega`) are left out; missing
+/// values of the other signals are interpolated linearly.
 const SIGNALS: [Signal; 4] = [
     Signal { name: "omega", required: true, between: Between::Line, unit: None },
     Signal { name: "tau_cmd", required: true, between: Between::Line, unit: None },
@@ -74,8 +74,9 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     Ok(())
 }
 
-/// Reads the recording of a run. Times count from the beginning of the torque, which is found by correlation with the
-/// plan's torque. Of the columns of a stored run, those that the recording contains are used.
+/// Reads the recording of a run. Returns the time between rows, s, and a table whose time is 0 at the beginning of
+/// the torque. This beginning is found by correlation of the recorded torque with the plan's torque. The table has
+/// those columns of a stored run that the recording contains.
 ///
 /// # Errors
 /// If the recording cannot be used, or has another torque.
@@ -208,9 +209,9 @@ impl Sought<'_> {
         if found > correlation { (clock, found) } else { (whole, correlation) }
     }
 
-    /// Returns true if the sweep with the opposite sign explains the record better than the sweep itself. A delay and an
-    /// error of the clock can compensate half a cycle, with a correlation of more than 0.9. Therefore the clock is also
-    /// fitted for the opposite sign before the two are compared.
+    /// Returns true if the record fits the sweep with the opposite sign better than the sweep itself. A wrong sign
+    /// looks like a shift by half a cycle, which a wrong `clock` can compensate with a `correlation` above 0.9.
+    /// Therefore a clock is also fitted for the opposite sign before the two correlations are compared.
     fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
         let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
         let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
@@ -235,8 +236,9 @@ impl Sought<'_> {
         product / f64::sqrt(squares * others)
     }
 
-    /// Estimates the clock by least squares from the phases of the record in blocks, compared with the phases of the sweep
-    /// at the times of `clock`, which must be approximately correct. Returns `None` if the blocks do not determine a clock.
+    /// Improves an approximate `clock`. The record is divided into blocks, and in each block its phase is compared
+    /// with the phase of the sweep. Least squares over all blocks then give the beginning and the rate of the
+    /// recorder's clock. Returns `None` if the blocks do not determine them.
     fn refined(&self, record: &[f64], clock: Clock) -> Option<Clock> {
         let (from, to) = self.span;
         let rows = (BLOCK_CYCLES / self.sweep.band().0 / self.step).ceil() as usize;

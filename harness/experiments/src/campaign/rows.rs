@@ -10,8 +10,9 @@ use host::fmu::Fmu;
 
 use self::Column::{Number, Text};
 
-/// A row of `features.csv`: a case, its outcome if it was analysed, the estimate from which the features of the row are
-/// taken, and, for a run that was not analysed, how it left the range of validity of its model.
+/// A row of a table of results. `run` is `None` for a run that was not analysed. `estimate` is the estimate that
+/// gives the antiresonance and resonance of the row, with its name. `limits` are sentences about models that left
+/// their range of validity, for a run that was not analysed.
 #[derive(Clone, Copy)]
 pub struct Row<'a> {
     pub case: &'a Case,

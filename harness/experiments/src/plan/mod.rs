@@ -299,8 +299,8 @@ impl Plan {
         Plan { onset: None, ..self.clone() }.cases(description)
     }
 
-    /// Replaces the cases of [`Plan::seeking`] by dwells. Each case comes with the frequency (Hz) and the torques
-    /// (N·m) of its dwells.
+    /// Replaces the cases of [`Plan::seeking`] by dwells, which are sine torques of constant frequency. An entry of
+    /// `dwells` has the case that is replaced, the frequency (Hz) and the torques (N·m).
     pub(crate) fn dwell(&mut self, dwells: Vec<(Case, f64, Vec<f64>)>) {
         let names: Vec<String> = self.grouping().into_iter().map(String::from).collect();
         let lines = self.onset.as_ref().map_or(Lines::default(), |onset| onset.lines.clone());
@@ -695,7 +695,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sweeps_of_the_command_line_equal_those_of_the_written_plan() {
+    fn sweeps_from_command_line_options_have_the_runs_of_the_built_in_plan() {
         let sweeps = |set: &[(&str, &str)]| {
             let set = set.iter().map(|(name, value)| (name.to_string(), value.to_string()));
             let texts = |values: &[f64]| values.iter().map(f64::to_string).collect();
@@ -843,7 +843,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_values_the_fmu_does_not_have_are_all_named_once() {
+    fn every_name_and_value_of_a_plan_that_the_fmu_lacks_is_reported_once() {
         let text = "profile = \"sine\"\nstop = 0.5\n[set]\ntank.hh = 1\nomega = 1\nslosh.model = \"oily\"\ntau_cmd = 1\n\
             [vary]\nprofile.amplitde = [1, 2]\n";
         let error = Plan::parse(text).unwrap().cases(&description()).unwrap_err().to_string();
@@ -869,7 +869,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_plan_lists_the_built_in_ones() {
+    fn the_error_for_an_unknown_plan_suggests_a_built_in_plan() {
         let error = Plan::read("thesis_model").unwrap_err().to_string();
         assert!(error.contains("did you mean \"thesis_models\""), "{error}");
     }

@@ -289,8 +289,9 @@ pub const SAMPLE: f64 = 0.02;
 /// user's interval between commands is kept. For a sine of frequency f the error is (2π f · interval)²/8. The value
 /// allows the thesis's sweeps up to 3.5 Hz to be commanded at 50 Hz.
 pub const COARSEST: f64 = 0.025;
-/// Largest error of linear interpolation between the commands of a profile, relative to its amplitude, after the
-/// user's interval was divided because its error exceeds [`COARSEST`].
+/// Allowed error of linear interpolation between the torque commands of a profile, relative to its amplitude, if the
+/// user's interval between commands is too long. The interval is too long if its error exceeds [`COARSEST`]; it is
+/// then divided until the error is at most this value.
 const FINEST: f64 = 0.001;
 
 /// Returns the largest product of frequency and interval (cycles) at which linear interpolation of a sine has at most
@@ -409,9 +410,9 @@ impl Torque {
 }
 
 impl Profile {
-    /// Returns the number of intervals between torque commands until `stop`, s, which need not be whole, and
-    /// the number of intervals in `sample`, s. Returns `None` if the torque is constant between its edges
-    /// and needs no commands.
+    /// Returns two numbers: the number of intervals between torque commands up to the time `stop` (s), which may end
+    /// within an interval, and the number of parts into which each interval `sample` (s) is divided. Returns `None`
+    /// if the torque needs no commands, because it is constant between its edges.
     fn commands(&self, sample: f64, stop: f64, hold: bool) -> Result<Option<(f64, usize)>> {
         let highest = self.shape.highest(stop);
         if highest == 0.0 {
@@ -495,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_reads_back_from_its_own_text() {
+    fn a_profile_that_is_written_and_parsed_again_is_unchanged() {
         for kind in KINDS {
             let profile: Profile = kind.name.parse().unwrap();
             assert_eq!(profile.to_string().parse::<Profile>().unwrap(), profile);
@@ -633,7 +634,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acceleration_step_is_inertia_times_acceleration() {
+    fn the_torque_of_an_acceleration_step_is_inertia_times_acceleration() {
         let text = "acceleration-step:acceleration=0.5,inertia=0.4,start=1,width=2,duration=5";
         let torque = Torque::Profile(text.parse().unwrap());
         assert_eq!([0.5, 1.0, 2.9, 3.0].map(|t| torque.torque_at(t)), [0.0, 0.2, 0.2, 0.0]);

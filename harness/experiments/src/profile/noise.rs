@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_from_0_hz_has_its_rms_and_a_sine_in_noise_is_the_sum_of_both_within_the_limit() {
+    fn noise_from_0_hz_has_the_specified_rms_and_the_sum_with_a_sine_is_clipped_at_the_limit() {
         let text = "sine-noise:amplitude=0.1,frequency=2,rms=0.05,limit=0.2";
         let both = crate::profile::Torque::Profile(text.parse().unwrap());
         let noise = Noise::new(0.05, (0.0, 20.0), 0.0, 1, f64::INFINITY);

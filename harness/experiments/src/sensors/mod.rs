@@ -21,9 +21,13 @@ use crate::profile::{Allowed, Parameter, Written, parameter};
 use crate::run;
 use signals::table::Table;
 
-/// A kind of sensor. `description` describes the measured quantity for readers of the help; `parameters` are in addition
-/// to [`ERRORS`]; `unit` is the unit of the readings, empty if they have the unit of the variable. `of` is the variable
-/// that the sensor reads unless `of=NAME` names another one; the outer `None` is for kinds that do not read a variable.
+/// A kind of sensor, for example a gyro.
+///
+/// - `description`: the measured quantity, for readers of the help.
+/// - `parameters`: parameters that this kind has in addition to [`ERRORS`].
+/// - `unit`: unit of the readings; empty if they have the unit of the variable that the sensor reads.
+/// - `of`: `None` if the kind measures a computed quantity. `Some(default)` if it reads one variable, which the user
+///   selects with `of=NAME`; `default` is the name of the variable otherwise, if there is one.
 #[derive(Debug)]
 pub struct Kind {
     pub name: &'static str,
@@ -316,8 +320,8 @@ impl Sensors {
         self.0.iter().flat_map(one).collect()
     }
 
-    /// Returns the first `kept` columns of a run's table and the readings of [`Sensors::read`]. The columns that were
-    /// recorded only for the sensors are left out.
+    /// Returns the table of a run with the readings of the sensors instead of the variables that were recorded only
+    /// for them. `kept` is the number of columns that the user has requested; they are the first columns of `table`.
     ///
     /// # Errors
     /// If the table lacks a variable that the sensors need.

@@ -27,8 +27,9 @@ use names::hubslosh::{
     self, G_AXIAL, OMEGA, OMEGA_DOT, SloshModel, SloshSource, THETA, bench, fluid, tank,
 };
 
-/// Measured quantity of one sensor, computed from the Real variables `needs` of the FMU. Each channel has the ending of
-/// its column's name, and its unit.
+/// Measured quantity of one sensor, computed from the Real variables `needs` of the FMU. `channels` are the numbers
+/// that the quantity consists of, for example the heights that a camera measures. Each channel has the name that
+/// follows the sensor's name in the table (empty for a single channel), and a unit.
 #[derive(Clone, Debug)]
 pub struct Quantity {
     pub needs: Vec<String>,
@@ -45,8 +46,9 @@ enum Rule {
     Acceleration { radius: f64, angle: f64 },
 }
 
-/// Meaning of the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh: slosh angle, rad; tangent of
-/// half the angle from the vertical, times the direction (`Stereographic`); or displacement of the slosh mass, m.
+/// Meaning of the coordinates `slosh.q_radial` and `slosh.q_tangential` of HubSlosh's pendulums: slosh angles, rad
+/// (`Angle`); components of a vector whose length is the tangent of half the angle from the vertical
+/// (`Stereographic`); or displacements of the slosh mass, m (`Displacement`).
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinate {
     Angle,
@@ -80,8 +82,8 @@ impl Coordinate {
     }
 }
 
-/// Slosh modes of the FMU, as a sensor reads them from its needed variables. The first of these are, for each mode, the
-/// radial coordinate, the tangential coordinate and the pendulum length, followed by the tank's diameter.
+/// Number of slosh modes and meaning of their coordinates. The variables that a sensor reads begin with the radial
+/// coordinate, the tangential coordinate and the pendulum length of each mode, followed by the tank's diameter.
 #[derive(Clone, Debug)]
 struct Modes {
     count: usize,

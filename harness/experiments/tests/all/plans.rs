@@ -17,8 +17,9 @@ const BEYOND: [&str; 7] = [
     "bench_damping",
 ];
 
-/// Selects the runs of a plan that the test simulates: those with the largest torque if there are many runs.
-fn some(cases: &[Case]) -> Vec<&Case> {
+/// Returns the runs of a plan that the test simulates. Of more than 20 runs these are only the runs with the largest
+/// torque.
+fn simulated_cases(cases: &[Case]) -> Vec<&Case> {
     let largest = cases.iter().filter_map(|case| case.amplitude).fold(0.0, f64::max);
     match cases.len() {
         0..=20 => cases.iter().collect(),
@@ -38,11 +39,11 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()
 }
 
-/// Slosh models in the test of the plan that seeks the onset of rotary slosh. They replace the plan's search, which takes
-/// seconds.
+/// List of slosh models in the text of the built-in plan that searches for the onset of rotary slosh.
 const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 
-/// The search for the onset of rotary slosh is tested only with the linear model, which leaves its range.
+/// The plan that searches for the onset of rotary slosh is simulated only with the linear model, because the search
+/// with each further model takes seconds.
 #[test]
 #[ignore = "six seconds: .ci/long-tests"]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
@@ -55,7 +56,7 @@ fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
         }
         seek_onset(&mut plan, &fmu, 0, &|_| {}).unwrap();
         let cases = plan.cases(fmu.description()).unwrap();
-        let cases = some(&cases);
+        let cases = simulated_cases(&cases);
         let says = text.contains("\n# Beyond the range of ");
         assert_eq!(says, BEYOND.contains(name), "{name}");
         if says {

@@ -61,8 +61,9 @@ fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     }
 }
 
-/// The pressure on the wall, integrated with the cosine of the angle as weight, must equal `F_tangential`, the force of the
-/// undamped pendulums and of the rigid liquid. All modes that are not simulated move with the tank in both results.
+/// The integral of the pressure over the wall, with the cosine of the angle as weight, must equal the output
+/// `F_tangential`. Both are computed without damping. In both, the liquid of modes that are not simulated moves with
+/// the tank.
 #[test]
 fn pressures_on_the_wall_add_up_to_the_force_on_the_tank() {
     // Gauss–Legendre quadrature with five points in each of 8 parts of the height

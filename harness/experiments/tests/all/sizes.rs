@@ -60,7 +60,7 @@ fn spacecraft(fmi: Fmi, settings: &[(String, String)]) -> anyhow::Result<Fmu> {
 /// The same parameters are set as array elements of a Spacecraft with arrays, and as scalars of a Spacecraft with scalars.
 /// `tanks` sets the size.
 #[test]
-fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last_bit() {
+fn spacecraft_with_arrays_and_spacecraft_with_scalars_move_bit_identically() {
     let set = settings(&SCALARS);
     let scalars = spacecraft(Fmi::V3, &set).unwrap();
     let expected = record(&scalars, &run(set), &COLUMNS);

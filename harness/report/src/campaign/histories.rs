@@ -65,8 +65,8 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// Plots rate and slosh angle after a manoeuvre. Each group has a colour, and its run in the middle of
-/// the axis is plotted.
+/// Plots rate and slosh angle after a manoeuvre for one run of each group, the middle one of the runs that are
+/// plotted over time. The colour shows the group.
 pub(super) fn motion_after_manoeuvre(page: &Page) -> Figure {
     let mut traces = Vec::new();
     let mut from = f64::INFINITY;

@@ -35,9 +35,9 @@ const MOST_GROUPS: usize = 24;
 
 const MOST_RUNS: usize = 6;
 
-/// Returns the run that the report shows in 3-D: the run with the largest radial slosh angle, because its
-/// slosh is rotary. If the slosh of every run stays in its plane, it is the run with the largest slosh angle.
-/// Recordings are not considered, because their liquid was not measured.
+/// Returns the run that the report shows in 3-D: the run with the largest radial slosh angle, which is large only in
+/// rotary slosh. If no run has a radial slosh angle, it is the run with the largest slosh angle. Recordings are left
+/// out, because they do not contain the motion of the liquid.
 pub fn most_swirling_run(results: &Results) -> Option<&Outcome> {
     let simulated = results.outcomes.iter().filter(|run| !run.is_recording());
     let (radial, tangential) =

@@ -6,9 +6,12 @@ use experiments::plan::{AMPLITUDE, Plan};
 use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
 
-/// Runs that differ only in the parameter along the axis. `fill` is in m, `None` if it is the axis. `others` are further differences from other groups, for
-/// example `tank.d 111 mm`. `drawn` are the runs whose time histories are plotted, and `exact` are the
-/// features of each run's exact linear response, evaluated on a grid over its band.
+/// Runs that differ only in the parameter on the horizontal axis of the figures.
+///
+/// - `fill`: depth of the liquid, m; `None` if it is on the axis.
+/// - `others`: further values by which this group differs from other groups, for example `tank.d 111 mm`.
+/// - `drawn`: the runs that are plotted over time.
+/// - `exact`: for each run, antiresonance and resonance of the exact linear response.
 pub(super) struct Group<'a> {
     pub model: &'a str,
     pub fill: Option<f64>,
@@ -80,8 +83,8 @@ impl Page<'_> {
 
 pub(super) const MOST_CURVES: usize = 24;
 
-/// Returns the estimate that gives the main results of a run, and its name: for a sweep the estimate
-/// in `features.csv`, otherwise `spa`.
+/// Returns the estimate whose antiresonance and resonance the page shows for a run, and its name. For a sweep it is
+/// the estimate in `features.csv`, otherwise `spa`.
 pub(super) fn best(run: &Outcome) -> Option<(&Estimate, &'static str)> {
     run.estimate().or_else(|| Some((&run.record.as_ref()?.spa, "spa")))
 }

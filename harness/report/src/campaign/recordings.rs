@@ -6,8 +6,9 @@ use experiments::rounding::thousandths;
 
 type Value = (f64, Option<f64>);
 
-/// A feature to compare: its heading, the function that reads it from a run with its standard deviation, its
-/// number of digits, and for differences between a model and the recording their factor, digits and unit.
+/// A number, such as the resonance, in which a model is compared with the recording. `value` reads the number and its
+/// standard deviation from a run; it is shown with `digits` digits. `difference` describes how model minus recording
+/// is shown: factor, digits and unit.
 struct Feature {
     heading: [&'static str; 2],
     value: fn(&Outcome) -> Option<Value>,

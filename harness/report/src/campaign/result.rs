@@ -539,7 +539,7 @@ mod tests {
     }
 
     #[test]
-    fn dwells_state_for_each_model_whether_the_slosh_was_rotary() {
+    fn the_report_counts_for_each_model_the_dwells_with_rotary_slosh() {
         let counted = |model: &str, rotary: usize, which: Option<&str>| Swirling {
             model: model.into(),
             runs: 6,
@@ -558,7 +558,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_two_digits() {
+    fn numbers_in_sentences_have_two_significant_digits() {
         let formatted = [0.0, 0.0123, 1.0, 1.24, 12.4, 124.0].map(format_two_digits);
         assert_eq!(formatted, ["0", "0.012", "1.0", "1.2", "12", "120"]);
     }

@@ -15,16 +15,16 @@ use super::page::{Group, cm, distinct, torque_amplitude};
 const SMALLEST: f64 = 0.0125;
 const LARGEST: f64 = 0.25;
 
-/// A number stated in the thesis.
+/// A number in Rubaga's thesis with which runs are compared.
 ///
-/// - `quantity` is the quantity with its unit, `printed` the number as the thesis prints it.
-/// - `synthetic`: true if the number is about the synthetic data, whose liquid is linear. It is then compared
-///   only with runs of the linear model.
-/// - `agreeing`: range of values that agree with the thesis. It is the thesis's own range if it states one;
-///   otherwise ±15 % for an acceleration (because the thesis states neither the fill nor the filter of its
-///   gyro), and half a step between torques for a torque.
-/// - `ours` computes the quantity for a group of runs that differ only in torque; `None` if runs
-///   or estimates are missing.
+/// - `quantity`: name with unit. `printed`: the number as the thesis prints it.
+/// - `synthetic`: true if the number is about the thesis's synthetic data. It is compared only with the linear model,
+///   with which these data were generated.
+/// - `agreeing`: range of values that count as agreement. If the thesis states no range, it is ±15 % for an
+///   acceleration, because the thesis states neither the fill nor the filter of its gyro, and half a step between
+///   torques for a torque.
+/// - `ours`: computes the quantity for a group of runs that differ only in torque; `None` if runs or estimates are
+///   missing.
 struct Number {
     section: &'static str,
     quantity: &'static str,

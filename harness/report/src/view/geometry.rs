@@ -167,9 +167,10 @@ impl Tank {
     }
 }
 
-/// Interpolation of a draining tank's modes and surface height over the mass of its liquid, as in the FMU: 1/l_n and
-/// h_n − l_n at the points of the fill table, with first and second derivatives, and the height of the surface, m,
-/// over the mass, kg.
+/// Modes and surface height of a draining tank over the mass of its liquid, interpolated as in the FMU. `masses` are
+/// the points of the fill table, kg. `modes` has for each mode the pendulum length l and the hinge height h as two
+/// curves, 1/l and h − l, each with its first and second derivative at the points. `levels` are pairs of a mass, kg,
+/// and the height of the surface, m.
 pub(super) struct Fill {
     masses: Vec<f64>,
     modes: Vec<[Vec<[f64; 3]>; 2]>,
@@ -217,8 +218,8 @@ fn depth_over_radius(share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Returns the pendulum length of a mode, m: `given`, or the length that follows from its natural frequency (Hz)
-/// at the acceleration `g`.
+/// Returns the pendulum length of a mode, m, that gives it the natural frequency `frequency` (Hz) at the acceleration
+/// `g` (m/s²), together with a stiffness per mass `k_over_m` (1/s²). Returns `given` if `frequency` is 0.
 fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
     let omega = std::f64::consts::TAU * frequency;
     let stiffness = (omega * omega - k_over_m) / g;
@@ -498,7 +499,7 @@ mod tests {
     /// The modes of the default tank have the parameters of a cylinder of 0.9 m diameter with a depth of 0.6 m, to six
     /// digits. The origin of the tank is at mid-depth.
     #[test]
-    fn modes_of_a_cylinder_are_drawn_as_that_cylinder() {
+    fn a_tank_with_the_modes_of_a_cylinder_is_drawn_as_this_cylinder() {
         let drawn = tank_with(&[]);
         let [radius, bottom] = radius_and_bottom(&drawn);
         for (found, exact) in [(radius, 0.45), (bottom, -0.3), (drawn.level, 0.3)] {
@@ -526,7 +527,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_that_is_given_by_its_frequency_has_the_length_of_that_frequency() {
+    fn a_mode_given_by_its_frequency_is_drawn_with_the_pendulum_length_of_this_frequency() {
         // 0.5 Hz at 1.5 m/s2: l = g/(2 pi f)^2
         let drawn = tank_with(&[("tank.frequency[1]", "0.5")]);
         let exact = 1.5 / (std::f64::consts::PI * std::f64::consts::PI);

@@ -66,7 +66,7 @@ fn kind(description: &ModelDescription) -> Option<Kind> {
     .find_map(|(name, kind)| has(name).then_some(kind))
 }
 
-/// Panels of the bench's plots, each with its title and its columns in the order of importance.
+/// Panels of the plots of HubSlosh, each with its title and its columns in the order of importance.
 const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Torque on the hub", &[TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FRICTION, TAU_FLUID]),
     ("Rate of the hub", &[OMEGA, OMEGA_IMU]),
@@ -124,7 +124,8 @@ pub fn columns(
     all
 }
 
-/// Lists the tanks of the FMU, each with the prefix of its variables and its number of modes; empty for the bench.
+/// Returns for each tank of Spacecraft or SloshTank the first part of its variables' names, such as `tank[1]`, and
+/// its number of modes. The list is empty for HubSlosh.
 fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
     let all: Vec<String> = match kind(parameters.description) {
         Some(Kind::Craft) => (1..=(parameters.number("tanks") as usize).max(1))

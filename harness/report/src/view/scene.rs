@@ -194,9 +194,8 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     (geometry, reach)
 }
 
-/// Returns the scene of a tank on the craft that carries it. The centre of the craft is the middle of
-/// the tank; the scene contains the point O and the arrows there. Also returns the radius that
-/// contains the scene, m.
+/// Returns the 3-D scene of SloshTank: the tank, the reference point O of the craft, and arrows at O. The scene is
+/// centred on the middle of the tank. Also returns the radius of a sphere that contains the scene, m.
 fn host_tank_scene(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let [middle, half] = tank.middle_and_extent();
     let [x, y, z] = tank.position;
