@@ -27,7 +27,7 @@ const AT_LEAST: u64 = 40;
 const TRIES: u64 = 16 * STARTS;
 /// Probability with which a random start value is divided by 100, because some dependencies show
 /// only at small values.
-const NEXT_TO_NOTHING: f64 = 0.1;
+const SMALL_VALUE_SHARE: f64 = 0.1;
 /// Relative change of a value below which the change counts as rounding and not as a dependency.
 const ROUNDING: f64 = 1e-9;
 
@@ -68,7 +68,7 @@ pub fn random_session<'f>(
             }
             Value::Real(x) => {
                 // Some effects show only near zero, for example friction at rest.
-                let share = if random.f64() < NEXT_TO_NOTHING { 0.01 } else { 1.0 };
+                let share = if random.f64() < SMALL_VALUE_SHARE { 0.01 } else { 1.0 };
                 let moved = share * x * (0.7 + 0.6 * random.f64());
                 Value::Real(moved.max(min).min(max.max(min)))
             }

@@ -82,7 +82,7 @@ fn number(v: &Variable, x: f64) -> Value {
 }
 
 /// Returns true if `x` is a value of the variable's type.
-fn fits(v: &Variable, x: f64) -> bool {
+fn is_value_of_type(v: &Variable, x: f64) -> bool {
     x.is_finite() && (v.is_real() || f64::from(x as i32) == x)
 }
 
@@ -101,7 +101,7 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
         let size = if v.is_real() { bound.abs().max(1e-3 * v.nominal()) } else { 1.0 };
         let outside = bound + outwards * size;
-        if fits(v, outside) && refusal(fmu, v, &number(v, outside))?.is_ok() {
+        if is_value_of_type(v, outside) && refusal(fmu, v, &number(v, outside))?.is_ok() {
             let (min, max) = v.bounds();
             findings.at(v.place()).add(format!(
                 "the value {outside} lies outside of min and max ({min} to {max}), but the FMU accepts it"
@@ -125,8 +125,8 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let far = bound + outwards * if v.is_real() { size } else { FAR };
         // An FMU that accepts every value breaks another rule, and has no exact range that could be compared.
         if near != bound
-            && fits(v, near)
-            && fits(v, far)
+            && is_value_of_type(v, near)
+            && is_value_of_type(v, far)
             && refusal(fmu, v, &number(v, far))?.is_err()
             && refusal(fmu, v, &number(v, near))?.is_ok()
         {

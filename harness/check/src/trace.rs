@@ -9,7 +9,7 @@ use super::findings::Findings;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Crash {
     Error,
-    /// A crash is an error or a warning, according to the [`Severity`](super::findings::Severity) of the rule,
+    /// A crash is an error or a warning, according to the severity of the rule,
     /// because the standard does not define the effect of the call.
     Open,
     /// Another rule with this name reports the crash, so that the present rule is skipped.

@@ -86,8 +86,7 @@ impl std::fmt::Display for Weightless {
 /// - `hinge`: hinge of the pendulum of mode 1 relative to the craft's reference point O, m.
 /// - `upwards`: unit vector from the bottom of the tank to the surface of the liquid.
 /// - `wave`: for each mode, height of the wave at the wall divided by the slosh angle, m.
-/// - `has_ball`: true if the FMU could simulate the detached liquid of this tank, but the parameter `ball.travel` is
-///   0.
+/// - `has_ball`: true if the FMU could simulate the detached liquid of this tank, but `ball.travel` is set to 0.
 #[derive(Clone, Debug)]
 struct Tank {
     name: String,

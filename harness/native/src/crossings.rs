@@ -19,10 +19,10 @@ use crate::schedule::bytes;
 
 /// Loop gain above which phase crossings are not searched. So large a gain occurs only close to a pole on the imaginary axis, for
 /// example at an integrator's pole at 0.
-const INTEGRATOR: f64 = 1e8;
+const MOST_GAIN: f64 = 1e8;
 /// Loop gain below which no phase crossing is searched, because a value this small consists of
 /// rounding errors.
-const NOTHING: f64 = 1e-12;
+const LEAST_GAIN: f64 = 1e-12;
 /// Allowance in ln L for errors of the poles and zeros, which are eigenvalues computed with rounding errors.
 const SLACK: f64 = 1e-3;
 /// Number of frequencies, evenly spaced on a logarithmic scale, with which every search begins.
@@ -529,7 +529,7 @@ impl Logarithm {
     fn look(&self, kind: Kind, half: f64, high: f64) -> Look {
         let Logarithm { value, slope, curvature } = *self;
         let reach = (slope[0].abs() + curvature[0] * half / 2.0) * half + SLACK;
-        let outside = value[0] - reach > INTEGRATOR.ln() || value[0] + reach < NOTHING.ln();
+        let outside = value[0] - reach > MOST_GAIN.ln() || value[0] + reach < LEAST_GAIN.ln();
         if kind == Kind::Phase && outside {
             return Look::None;
         }
@@ -625,8 +625,8 @@ fn search(
     let mut found = Vec::new();
     let mut nearest = f64::INFINITY;
     let mut add = |kind: Kind, w: f64, gain: Complex| {
-        let is = kind == Kind::Gain || (gain.re < 0.0 && gain.norm() > NOTHING);
-        if is && gain.norm() < INTEGRATOR {
+        let is = kind == Kind::Gain || (gain.re < 0.0 && gain.norm() > LEAST_GAIN);
+        if is && gain.norm() < MOST_GAIN {
             found.push((kind == Kind::Gain, w, gain.re, gain.im));
         }
     };

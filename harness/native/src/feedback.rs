@@ -229,7 +229,7 @@ impl Feedback {
         Ok(())
     }
 
-    /// Adds the present speeds of the wheels to the record. At the last row nothing else is recorded.
+    /// Adds the present speeds of the wheels to the record. The last row has speeds, but no commands.
     pub fn record_speeds(&mut self) {
         if let Some(wheels) = &mut self.wheels {
             let speeds: Vec<f64> = wheels.each.iter().map(|wheel| wheel.speed).collect();

@@ -58,7 +58,7 @@ pub fn error(why: impl Into<anyhow::Error>) -> PyErr {
     FmuError::new_err(input::without_error_numbers(&format!("{:#}", why.into())))
 }
 
-/// Returns a value as an object of Python.
+/// Converts a value to a Python object.
 pub fn object(py: Python, value: Value) -> PyResult<Py<PyAny>> {
     match value {
         Value::Real(value) => value.into_py_any(py),

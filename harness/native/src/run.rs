@@ -16,7 +16,7 @@ use crate::numbers::{Failure, Numbers};
 const ROWS: usize = 1024;
 /// Longest time that a run computes before it returns briefly to Python, unless a single step takes
 /// longer.
-const SILENCE: Duration = Duration::from_millis(100);
+const LONGEST_COMPUTATION: Duration = Duration::from_millis(100);
 
 /// Variables that form the columns of a table. Reals are read or set with one call of the FMU, variables of other types with one
 /// call each.
@@ -232,7 +232,7 @@ impl<'fmu> Run<'fmu> {
             Python::attach(|py| self.visit(py)).map_err(|why| (row, why.into()))?;
             let (first, visited) = (row, Instant::now());
             while row < self.time.len() && row - first < ROWS {
-                if row % 16 == 0 && visited.elapsed() > SILENCE && row > first {
+                if row % 16 == 0 && visited.elapsed() > LONGEST_COMPUTATION && row > first {
                     break;
                 }
                 self.row(instance, row, row - first).map_err(|why| (row, why))?;

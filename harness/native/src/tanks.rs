@@ -19,7 +19,7 @@ use pyo3::types::PyDict;
 use crate::fmu::FmuError;
 
 /// Time between two checks whether the user has pressed Ctrl-C, while the threads compute.
-const SILENCE: Duration = Duration::from_millis(100);
+const CTRL_C_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A tank, read from a file or from a text.
 #[pyclass(frozen, module = "hubslosh")]
@@ -318,12 +318,12 @@ fn compute_in_threads<T: Send + 'static>(
         let receiver = receiver;
         let mut heard = Instant::now();
         loop {
-            match receiver.recv_timeout(SILENCE) {
+            match receiver.recv_timeout(CTRL_C_INTERVAL) {
                 Ok((i, answer)) => found[i] = Some(answer),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
-            if heard.elapsed() >= SILENCE {
+            if heard.elapsed() >= CTRL_C_INTERVAL {
                 heard = Instant::now();
                 Python::attach(|py| py.check_signals())
                     .inspect_err(|_| shared.2.store(true, Ordering::Relaxed))?;

@@ -22,7 +22,7 @@ const ITERATIONS: usize = 100;
 const IMMEDIATE: usize = 3;
 /// Largest number of events in a session before and after which all values are compared. Only events that
 /// fmi2CompletedIntegratorStep requests, without a time event or a crossing, are compared.
-const ASKED: usize = 20;
+const MOST_COMPARED_EVENTS: usize = 20;
 /// Relative change of a state at an event below which the change counts as rounding.
 const JUMP: f64 = 1e-9;
 const UNKNOWN_NOMINAL: f64 = 1e-3;
@@ -38,7 +38,7 @@ pub struct Notes {
     /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
     /// index, and both values.
     pub hidden_jump: Option<(f64, usize, f64, f64)>,
-    asked: usize,
+    compared_events: usize,
     /// The first variable that changed in an event which only fmi2CompletedIntegratorStep had requested: time of the
     /// event (s), name of the variable, and its old and new value, for example `1 to 2`.
     pub step_event: Option<(f64, String, String)>,
@@ -101,12 +101,14 @@ impl Tested for Fmi2 {
         if !(completed.enter_event_mode || crossed || due) {
             return Ok(());
         }
-        let is_asked =
-            !crossed && !due && session.notes.asked < ASKED && session.notes.step_event.is_none();
+        let is_asked = !crossed
+            && !due
+            && session.notes.compared_events < MOST_COMPARED_EVENTS
+            && session.notes.step_event.is_none();
         if !is_asked {
             return session.event();
         }
-        session.notes.asked += 1;
+        session.notes.compared_events += 1;
         let before = Observed::read(session)?;
         session.event()?;
         if !session.is_ended()

@@ -675,7 +675,7 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// Returns true if a value has changed by more than a few units in its last place. Such small changes come from
 /// rounding, for example if two terms cancel.
-fn follows(after: f64, before: f64) -> bool {
+fn has_changed(after: f64, before: f64) -> bool {
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let same = after.to_bits() == before.to_bits()
         || (after - before).abs() <= ROUNDING * after.abs().max(before.abs());
@@ -716,7 +716,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 let by = 1e-2 * base[element].abs().max(known.nominal());
                 subject.announce(format!("moving {} and reading {}", known.name, v.name));
                 let after = unknown_at_displacement(&mut session, v, known, &base, element, by)?;
-                if after.iter().zip(&before).any(|(a, b)| follows(*a, *b)) {
+                if after.iter().zip(&before).any(|(a, b)| has_changed(*a, *b)) {
                     findings.at(format!("line {}, {}, {}", unknown.line, unknown.list, v.name)).add(format!(
                             "the unknown changes with {}, which is not among its dependencies: {before:?} becomes {after:?}",
                             known.name

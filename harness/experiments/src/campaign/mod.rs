@@ -241,7 +241,7 @@ impl Campaign {
             }
         };
         let done = |(i, case)| {
-            let done = self.done(fmu, case, store, watch, &warn)?;
+            let done = self.simulate_or_read(fmu, case, store, watch, &warn)?;
             Ok(if keeps_curves(i, cases.len()) { done } else { done.without_curves() })
         };
         let results: Result<Vec<Done>> =
@@ -351,7 +351,7 @@ impl Campaign {
     /// # Errors
     /// If the run cannot be stored. The campaign then ends, because no other run could be stored
     /// either.
-    fn done(
+    fn simulate_or_read(
         &self,
         fmu: &Fmu,
         case: &Case,

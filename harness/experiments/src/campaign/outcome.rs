@@ -621,7 +621,7 @@ pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary
 /// Returns the rate of the hub, rad/s, that the exact linear model predicts in each row of a run. `recorded` is the
 /// torque in each row, N·m, and `start` the rate in the first row. The prediction uses `recorded` for a sweep, and
 /// the plan's history for other torques, because they may jump between two rows.
-fn modelled(
+fn linear_rate(
     run: &Run,
     case: &Case,
     recorded: &[f64],
@@ -687,7 +687,7 @@ impl Outcome {
         // the initial rate of a recording is the measured rate minus the bias
         let start = column(OMEGA).first().copied().unwrap_or(0.0)
             - if is_recording { rates.bias } else { 0.0 };
-        let modelled = modelled(run, case, column(TAU_CMD), start, &linear)?;
+        let modelled = linear_rate(run, case, column(TAU_CMD), start, &linear)?;
         let residual: Vec<f64> =
             rates.about_axis.iter().zip(&modelled).map(|(y, m)| y - m).collect();
         let signals = [TAU_CMD, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, "omega_x", "omega_y"];

@@ -426,7 +426,7 @@ impl Plan {
         for Named { name, value, lines } in
             self.set.iter().chain(values).filter(|one| of_fmu(&one.name))
         {
-            problems.take(lines, settable(description, input, name, value));
+            problems.take(lines, check_setting(description, input, name, value));
             settings.push((name.clone(), value.clone()));
         }
 
@@ -557,7 +557,7 @@ impl Plan {
 }
 
 /// Fails unless the FMU has this parameter or input and accepts the format of the value.
-fn settable(
+fn check_setting(
     description: &ModelDescription,
     input: &Option<String>,
     name: &str,

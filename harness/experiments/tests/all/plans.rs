@@ -27,7 +27,7 @@ fn simulated_cases(cases: &[Case]) -> Vec<&Case> {
     }
 }
 
-fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
+fn range_warnings(fmu: &Fmu, case: &Case) -> Vec<String> {
     let run = case.run();
     let mut instance = run.initialise(fmu).unwrap();
     let mut said = instance.take_warnings();
@@ -60,10 +60,11 @@ fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
         let says = text.contains("\n# Beyond the range of ");
         assert_eq!(says, BEYOND.contains(name), "{name}");
         if says {
-            let leaves = cases.par_iter().any(|case| !beyond(&fmu, case).is_empty());
+            let leaves = cases.par_iter().any(|case| !range_warnings(&fmu, case).is_empty());
             assert!(leaves, "{name}");
         } else {
-            let left: Vec<String> = cases.par_iter().flat_map(|case| beyond(&fmu, case)).collect();
+            let left: Vec<String> =
+                cases.par_iter().flat_map(|case| range_warnings(&fmu, case)).collect();
             assert!(left.is_empty(), "{name}: {left:#?}");
         }
     }

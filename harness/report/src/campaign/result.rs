@@ -58,7 +58,7 @@ impl Series {
 
     /// Returns the first and the last position on the axis with rotary slosh, and true if every position from
     /// the first to the end of the axis has rotary slosh. Returns `None` without rotary slosh.
-    fn swirl(&self) -> Option<(f64, f64, bool)> {
+    fn rotary_range(&self) -> Option<(f64, f64, bool)> {
         let first = self.points.iter().position(|p| p.swirls)?;
         let last = self.points.iter().rposition(|p| p.swirls)?;
         let on = last + 1 == self.points.len() && self.points[first..].iter().all(|p| p.swirls);
@@ -116,7 +116,7 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
     if name != "torque amplitude" || nonlinear.is_empty() {
         sentences.extend(describe_shifts(series, name, unit, several));
     }
-    let swirling: Vec<&&Series> = nonlinear.iter().filter(|s| s.swirl().is_some()).collect();
+    let swirling: Vec<&&Series> = nonlinear.iter().filter(|s| s.rotary_range().is_some()).collect();
     let ends = |s: &Series| s.points.first().map(|p| p.x).zip(s.points.last().map(|p| p.x));
     // the range of torques before the first rotary slosh, or the whole axis
     let below = |s: &&Series| -> Vec<Point> {
@@ -157,7 +157,7 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
         return finished(&sentences);
     }
     let part = |s: &Series| {
-        let (first, last, on) = s.swirl().expect("they swirl");
+        let (first, last, on) = s.rotary_range().expect("they swirl");
         let with = if several { format!(" ({})", s.plant) } else { String::new() };
         let with = match nonlinear.iter().any(|other| other.model != s.model) {
             true => format!("{with} ({})", s.model),
@@ -172,7 +172,8 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
     let where_ = match swirling.len() {
         0..=3 => swirling.iter().map(|s| part(s)).collect::<Vec<_>>().join(" and "),
         many => {
-            let first = swirling.iter().filter_map(|s| Some(s.swirl()?.0)).fold(f64::MAX, f64::min);
+            let first =
+                swirling.iter().filter_map(|s| Some(s.rotary_range()?.0)).fold(f64::MAX, f64::min);
             format!("in {many} of {} series, from {first}{unit} at the earliest,", series.len())
         }
     };
@@ -241,7 +242,7 @@ fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> 
             capital(&format!("{} ({name} from {from} to {to}{unit}{with})", parts.join(", ")))
         })
     };
-    few(these.iter().filter_map(sentence).collect(), 3)
+    shorten_list(these.iter().filter_map(sentence).collect(), 3)
 }
 
 fn describe_single_runs(series: &[Series]) -> String {
@@ -264,7 +265,7 @@ fn describe_single_runs(series: &[Series]) -> String {
             ),
         })
     };
-    finished(&few(series.iter().filter_map(describe).collect(), 3))
+    finished(&shorten_list(series.iter().filter_map(describe).collect(), 3))
 }
 
 impl Series {
@@ -318,7 +319,7 @@ fn left_behind(page: &Page) -> String {
         }
     });
     let along = if name.is_empty() { String::new() } else { format!(", over {name}") };
-    let parts = few(parts.collect(), 4);
+    let parts = shorten_list(parts.collect(), 4);
     finished(&[format!("Largest rate that the manoeuvre leaves{along}: {}", parts.join("; "))])
 }
 
@@ -403,7 +404,7 @@ fn largest_angle_of_other_fmus(results: &Results) -> String {
 
 /// Returns the first `most` parts of a list, and instead of the others their number ("3 more
 /// in the results table").
-fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
+fn shorten_list(mut parts: Vec<String>, most: usize) -> Vec<String> {
     let further = parts.len().saturating_sub(most);
     if further > 0 {
         parts.truncate(most);

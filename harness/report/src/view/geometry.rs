@@ -84,12 +84,12 @@ pub struct Drawing {
 
 impl Drawing {
     fn level(&self, liquid: f64) -> f64 {
-        line(&self.levels, liquid)
+        interpolate(&self.levels, liquid)
     }
 }
 
 /// Interpolates linearly between points with ascending x. Outside of the points the value of the nearest end is returned.
-fn line(points: &[[f64; 2]], x: f64) -> f64 {
+fn interpolate(points: &[[f64; 2]], x: f64) -> f64 {
     let after = points.partition_point(|p| p[0] < x);
     match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {
         (Some(a), Some(b)) => a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0]),
@@ -179,7 +179,7 @@ pub(super) struct Fill {
 
 impl Fill {
     pub fn level(&self, liquid: f64) -> f64 {
-        line(&self.levels, liquid)
+        interpolate(&self.levels, liquid)
     }
 
     /// Interpolates length and hinge height of mode `n` (from 0), m, for a mass of liquid in kg.
