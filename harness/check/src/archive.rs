@@ -107,8 +107,8 @@ impl Archive {
         }
     }
 
-    /// Returns the content of a file of the archive that rules read, or `None` if the file does not
-    /// exist or could not be unpacked.
+    /// Returns the content of a file of the archive. Returns `None` if the file does not exist or could not be
+    /// unpacked, or if no rule needs its content.
     pub fn file(&self, name: &str) -> Option<&[u8]> {
         let entry = self.entries.iter().find(|entry| entry.name == name && is_read(name))?;
         entry.fault.is_none().then_some(entry.content.as_slice())

@@ -19,8 +19,8 @@ use host::description::{Type, Value};
 /// Largest number of initial points that are tried before a declared feedthrough counts as missing in the
 /// binary.
 const STARTS: u64 = 600;
-/// Smallest number of initial points that are tried. This number is enough to find most dependencies that the
-/// description does not declare.
+/// Smallest number of initial points (values of parameters, inputs and states) from which dependencies are observed.
+/// This number is enough to find most dependencies that the description does not declare.
 const AT_LEAST: u64 = 40;
 /// Largest number of attempts to reach [`STARTS`] initial points. There are more attempts than points, because the FMU
 /// may refuse parameters that are drawn at random.
@@ -202,9 +202,9 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Changes inputs and states one by one, from many initial points, and returns the observed dependencies of
-/// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Skips the rule if
-/// there is nothing to observe.
+/// Changes inputs and states one by one, from many initial points, and returns the observed dependencies of outputs
+/// and derivatives. Stops early when all dependencies in `wanted`, which are pairs (unknown, known), have been
+/// observed. Skips the rule if there is nothing to observe.
 fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
     let d = fmu.description;
     let lists: Vec<&Unknown> = d.running_unknowns().collect();

@@ -91,8 +91,8 @@ const OPENING: [&str; 10] = [
     "xml.doctype",
 ];
 
-/// Checks all rules, or the rules that `options` selects. After each rule of calls, `progress` receives the number of
-/// rules of calls that have been checked.
+/// Checks an FMU by all rules, or by the rules that `options` selects. `progress` receives the number of rules that
+/// have been checked so far by calls of the FMU.
 ///
 /// # Errors
 ///

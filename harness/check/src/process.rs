@@ -21,8 +21,8 @@ use super::under_test::{Tested, UnderTest, Unusable};
 pub const SUBCOMMAND: &str = "check-calls";
 /// Number of rules in which a call did not return, after which no further rules of calls are run.
 const HANGS: usize = 2;
-/// Time limit of a single call of the FMU. If the time limit of the rule is short, the limit of a call is shorter, too.
-/// [`HANGS`] endless calls take at most about 10 s.
+/// Time limit of a single call of the FMU. It is shorter if the time limit of the rule is shorter. With this limit
+/// the [`HANGS`] endless calls, after which the check stops calling the FMU, take at most about 10 s.
 const CALL: Duration = Duration::from_secs(4);
 const PART: f64 = 15.0;
 /// Largest file that an FMU may write, bytes. It is small because several rules run at the same time.

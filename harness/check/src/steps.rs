@@ -348,8 +348,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     /// Change of an input within a step, relative to its magnitude, by which the rule tests whether
     /// the FMU uses the input's slope.
     const SHARE: f64 = 0.3;
-    /// An FMU ignores the slope of an input if a held input and an input with a slope have almost equal effects: the
-    /// difference is below this fraction of the held input's effect.
+    /// Limit below which the rule reports that the FMU ignores the slope of an input: the difference between the
+    /// effects of a held input and of an input with a slope, divided by the effect of the held input.
     const IGNORED: f64 = 0.05;
     after_three_steps(fmu)?;
     fmu.require(Interface::CoSimulation, "canInterpolateInputs")?;

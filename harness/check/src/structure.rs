@@ -13,8 +13,9 @@ fn place(d: &Description, u: &Unknown) -> String {
     format!("line {}, {}, {}", u.line, u.list, d.name_of(u.key))
 }
 
-/// Compares the entries of one `list` of ModelStructure with the variables that must be in it. Reports entries that are
-/// repeated or not `allowed`, and missing variables that are `needed`. `why` describes the allowed entries in messages.
+/// Compares the entries of `list`, a list of ModelStructure, with the variables of the description. Reports entries
+/// that are repeated or not `allowed`, and variables that are `needed` but missing in the list. `why` describes the
+/// allowed entries in messages.
 fn compare(
     d: &Description,
     findings: &mut Findings,

@@ -619,7 +619,8 @@ impl<V: Tested> Session<'_, V> {
         (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
-    /// Resets the time and other quantities of the host to the start, where the FMU is after a reset.
+    /// Sets the time and other quantities that the host stores to their values at the start, because the FMU has been
+    /// reset.
     pub fn rewind(&mut self) {
         let time = self.fmu.experiment().start;
         self.go_back(&Mark { time, count: 0, next_event: None, ended: None });

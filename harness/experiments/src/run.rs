@@ -71,8 +71,8 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
     }
 }
 
-/// Name of the column in a torque history that is not an input of the FMU: the derivative of
-/// [`TORQUE`] until the next row, N·m/s.
+/// Name of the column with the time derivative of [`TORQUE`] until the next row, N·m/s. This column of a torque
+/// history is not an input of the FMU.
 pub const SLOPE: &str = "tau_slope";
 
 /// Reads histories of inputs from a file. Each column must be the `time` or have the name of an input of the FMU;

@@ -39,16 +39,17 @@ pub struct Found {
     pub json: Value,
 }
 
-/// Known quantity of the flight tank: the radius, m, from which the acceleration is computed, or the
-/// acceleration, m/s² or rad/s², from which the radius is computed.
+/// Quantity of the full-size tank in flight that the user knows: its radius, m, or its acceleration, m/s² or rad/s².
+/// The other one is computed from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
     Radius(f64),
     Acceleration(f64),
 }
 
-/// Computes the Bond number of the bench's liquid at the acceleration `a` (m/s²) in a tank of `radius` (m),
-/// and the flight tank with `liquid` that has the same Bond number.
+/// Computes the Bond number of the liquid `bench` at the acceleration `a` (m/s²) in a tank of `radius` (m). Also
+/// computes radius and acceleration of a tank with the other `liquid` in flight that has the same Bond number;
+/// `flight` states which of the two is given.
 ///
 /// # Errors
 /// If a value is not positive.

@@ -292,8 +292,8 @@ mod tests {
         Tanks { tanks: vec![tank], accelerometer: "specific_force" }
     }
 
-    /// Returns the warnings about the tanks for a run. Its rows contain the specific force along y, the angular
-    /// acceleration about z, the rate about x, and the rates of the first two modes along x.
+    /// Returns the warnings about the tanks for a run. A row of the run has five numbers: specific force along y,
+    /// angular acceleration about z, rate about x, and the slosh rates of the first two modes along x.
     fn warnings(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
         let names: Vec<String> =
             ["time".to_string()].into_iter().chain(tanks.required_variables()).collect();

@@ -23,14 +23,15 @@ const MOST_GAIN: f64 = 1e8;
 /// Loop gain below which no phase crossing is searched, because a value this small consists of
 /// rounding errors.
 const LEAST_GAIN: f64 = 1e-12;
-/// Allowance in ln L for errors of the poles and zeros, which are eigenvalues computed with rounding errors.
+/// Allowed error of ln L, the logarithm of the loop gain. Its poles and zeros are eigenvalues computed with rounding
+/// errors.
 const SLACK: f64 = 1e-3;
 /// Number of frequencies, evenly spaced on a logarithmic scale, with which every search begins.
 const GRID: usize = 40;
 const MOST: usize = 5_000;
 
-/// A state-space model with A in Hessenberg form, so that the response at one frequency takes a number of operations that grows
-/// as n² (n states) instead of n³. Matrices are stored row after row.
+/// A state-space model whose matrix A is in Hessenberg form. Therefore the number of operations for the response at
+/// one frequency is proportional to n² (n states) and not to n³. Matrices are stored row after row.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Model {
     states: usize,
@@ -309,8 +310,8 @@ struct Shape {
     period: f64,
 }
 
-/// Value of ln L at one frequency, its derivative by ω, and a bound of its second derivative. Each is a pair: real part (log
-/// magnitude) and imaginary part (phase, rad).
+/// The logarithm of the loop gain L at one frequency, its derivative with respect to the frequency ω, and a bound of
+/// its second derivative. Each is a pair: real part (ln |L|) and imaginary part (phase, rad).
 struct Logarithm {
     value: [f64; 2],
     slope: [f64; 2],
@@ -385,8 +386,8 @@ impl Shape {
         shape
     }
 
-    /// Returns ln L at the frequency `w`, rad/s, with its slope, and a bound of its curvature that holds at all frequencies
-    /// within `half` of `w`.
+    /// Returns the logarithm of the loop gain L at the frequency `w`, rad/s, with its slope, and a bound of its
+    /// curvature that holds at all frequencies within `half` of `w`.
     fn at(&self, w: f64, half: f64) -> Logarithm {
         let s = point(w, self.period);
         // ds/dω, and the distance by which s can move within `half`
@@ -439,8 +440,8 @@ impl Shape {
         }
     }
 
-    /// Returns ln |L|² at the frequency `w`, rad/s, without the constant factor of L, which does
-    /// not change the frequencies of minima.
+    /// Returns the logarithm of |L|², the squared magnitude of the loop gain, at the frequency `w`, rad/s. The
+    /// constant factor of L is left out, because it does not change the frequencies of minima.
     fn size(&self, w: f64) -> f64 {
         let s = point(w, self.period);
         let (mut above, mut below) = (Product::new(), Product::new());

@@ -111,7 +111,8 @@ impl Wheel {
 struct Wheels {
     each: Vec<Wheel>,
     references: [u32; 3],
-    /// Angular momentum of all wheels relative to the body, N·m·s, at the beginning of the present step, and its derivative.
+    /// Total angular momentum of the wheels relative to the body, N·m·s, at the beginning of the present step.
+    /// `slope` is its time derivative.
     momentum: [f64; 3],
     slope: [f64; 3],
     step: f64,
@@ -136,8 +137,8 @@ pub struct Feedback {
     /// of cycle k are at position k modulo `latency` + 1.
     on_the_way: Vec<f64>,
     now: Vec<f64>,
-    /// Commands that act from each row on, within the limits of the wheels. There is one row of commands for each
-    /// row of the run.
+    /// One row of commands for each row of the run: the commands that act from this row to the next. Torques of
+    /// wheels are limited to the torque that the wheel can give.
     commands: Numbers,
 }
 

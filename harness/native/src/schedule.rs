@@ -77,8 +77,8 @@ pub fn check_interpolation(
     schedule::check_interpolation(fmu.description(), inputs, hold).map_err(error)
 }
 
-/// Return two sentences for the metadata of a result: the times for which inputs and outputs of one row hold, and how inputs
-/// change between rows.
+/// Return two sentences for the metadata of a result. They state at which times the inputs and the outputs of a row
+/// are valid, and whether inputs are constant (`hold`) or linear between rows.
 #[pyfunction]
 pub fn pairing(hold: bool) -> (&'static str, &'static str) {
     (schedule::ROWS, schedule::between(hold))

@@ -17,8 +17,8 @@ use crate::progress::Progress;
 
 const APART: f64 = 0.0025;
 const WITHIN: f64 = 0.0025;
-/// Number of grid steps by which the frequencies with rotary slosh at a smaller torque may lie outside the range of
-/// frequencies with rotary slosh at a larger torque.
+/// Number of grid steps by which the searched range of frequencies is extended at both ends when the torque is
+/// reduced. The range contains the frequencies with rotary slosh at the previous, larger torque.
 const MARGIN: usize = 3;
 
 #[derive(Clone, Copy)]

@@ -49,8 +49,9 @@ const MOST_SHIFT: f64 = 0.25;
 
 const LEAST_SNR: f64 = 0.0;
 
-/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. The work is large if
-/// the band begins far below one cycle per run, because the windows of most frequencies then contain all rows.
+/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. The work is
+/// large if the band begins far below one cycle per run, because the analysis windows of most frequencies then
+/// contain all rows of the run.
 pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> {
     let Some((profile, band)) = torque.profile().and_then(|p| Some((p, p.band()?))) else {
         return Ok(());
@@ -139,8 +140,8 @@ struct Rates {
     warnings: Vec<String>,
 }
 
-/// Ratio of a rate's mean to its standard deviation above which a warning reports the mean. A mean of this size would add 1 %
-/// to the energy of the rate.
+/// Ratio of a rate's mean to its standard deviation above which a warning reports the mean as a possible bias of the
+/// gyro. A mean of this size adds 1 % to the mean square of the rate.
 const NOTABLE_MEAN: f64 = 0.1;
 const PARTS: usize = 8;
 

@@ -47,8 +47,8 @@ pub const BUILT_IN: &[(&str, &str)] = plans! {
 
 /// Time between the rows of a result, s, if the plan does not state it: the sampling period of the thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
-/// Names that a plan usually varies. Runs that vary only these have the file names `<model>_<fill>mm_<amplitude>`, which
-/// are a documented interface.
+/// Names that a plan usually varies. If a plan varies no other names, the files of its runs are called
+/// `<model>_<fill>mm_<amplitude>`; users rely on these names, so that they must not change.
 const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
 pub const AMPLITUDE: &str = "profile.amplitude";
 const FREQUENCY: &str = "profile.frequency";

@@ -151,7 +151,7 @@ impl FromStr for Sensor {
 }
 
 impl Sensor {
-    /// Creates a sensor with the name of its column from `KIND:key=value,…`.
+    /// Creates a sensor from its text `KIND:key=value,…`. The column of its readings gets the name `name`.
     ///
     /// # Errors
     /// Lists everything that is wrong with it.
@@ -266,7 +266,8 @@ impl Sensor {
 pub struct Sensors(Vec<(Sensor, Quantity)>);
 
 impl Sensors {
-    /// Creates the sensors of a run with these settings, whose rows are `step` seconds apart.
+    /// Creates the sensors of a run. `settings` are the start values that the run sets, and its rows are `step`
+    /// seconds apart.
     ///
     /// # Errors
     /// Lists everything that is wrong with them.

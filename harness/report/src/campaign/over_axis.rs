@@ -23,9 +23,9 @@ fn quantity<'a>(label: &'a str, value: &'a dyn Fn(&Outcome) -> Option<f64>) -> Q
     Quantity { label, value, decades: false, level: None }
 }
 
-/// Plots antiresonance and resonance of every group over the axis, and for comparison antiresonance and resonance
-/// of the exact linear model. The colour shows the group, the line style the slosh model, and the marker the
-/// feature (antiresonance or resonance).
+/// Plots antiresonance and resonance of every group over the axis, and for comparison antiresonance and resonance of
+/// the exact linear model. The colour shows the group, the line style the slosh model, and the marker whether a point
+/// is an antiresonance or a resonance.
 pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let models = distinct(page.groups.iter().map(|group| group.model));

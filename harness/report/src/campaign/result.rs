@@ -56,8 +56,8 @@ impl Series {
         [SloshModel::Linear.name(), SloshModel::Frozen.name()].contains(&&*self.model)
     }
 
-    /// Returns the first and the last position on the axis with rotary slosh, and true if every position from
-    /// the first to the end of the axis has rotary slosh. Returns `None` without rotary slosh.
+    /// Returns the smallest and the largest torque (or other value on the axis) with rotary slosh, and true if the
+    /// slosh is rotary at every value from the smallest to the end of the axis. Returns `None` without rotary slosh.
     fn rotary_range(&self) -> Option<(f64, f64, bool)> {
         let first = self.points.iter().position(|p| p.swirls)?;
         let last = self.points.iter().rposition(|p| p.swirls)?;

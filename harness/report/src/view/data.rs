@@ -32,8 +32,8 @@ impl Thinning {
         kept
     }
 
-    /// Returns the number of kept rows per oscillation of the column that oscillates fastest, if there are
-    /// too few rows to show the oscillation; otherwise `None`.
+    /// Returns a number if the animation has too few rows to show an oscillation: the number of rows per oscillation
+    /// of the column that oscillates fastest. Otherwise returns `None`.
     pub fn too_few(&self, columns: &[&[f64]]) -> Option<f64> {
         let frames = |column: &&[f64]| {
             let (low, high) = range(column.iter().copied());

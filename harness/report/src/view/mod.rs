@@ -159,8 +159,9 @@ impl Columns<'_> {
         there
     }
 
-    /// Finds the first list of which the run has all columns, marks these columns as used, and returns the index of the
-    /// list. If there is no such list, records which columns are missing.
+    /// Finds the first of alternative `lists` of columns of which the run has all columns, marks these columns as
+    /// used, and returns the index of the list. If the run has none of the lists completely, records which columns
+    /// are missing.
     fn require(&mut self, lists: &[Vec<String>]) -> Option<usize> {
         let found = (0..lists.len()).find(|i| self.take(&lists[*i]));
         if found.is_none() {
