@@ -47,9 +47,9 @@ pub enum Flight {
     Acceleration(f64),
 }
 
-/// Computes the Bond number of the liquid `bench` at the acceleration `a` (m/s²) in a tank of `radius` (m). Also
-/// computes radius and acceleration of a tank with the other `liquid` in flight that has the same Bond number;
-/// `flight` states which of the two is given.
+/// Computes the Bond number of the liquid `bench` at the acceleration `a` (m/s²) in a tank of `radius` (m). If `flight`
+/// is the radius or the acceleration of a tank with the other `liquid`, also computes the acceleration or the radius at
+/// which this tank has the same Bond number.
 ///
 /// # Errors
 /// If a value is not positive.
