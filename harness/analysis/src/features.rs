@@ -25,10 +25,10 @@ pub struct Deviations {
 impl Features {
     /// Returns the standard deviations of the features that follow from errors of the response.
     /// `relative` is the relative standard deviation of the response at each frequency. `slope`
-    /// returns how fast the error varies along the frequency axis at a frequency in Hz, relative to
-    /// the error, in 1/Hz. Simulated errors are added to the response, and the features are found
-    /// again. In a check with other simulated errors, 95 % of the shifts of a feature were below
-    /// 1.96 standard deviations.
+    /// returns how fast the error varies along the frequency axis: the rate of change of the error
+    /// at a frequency in Hz, divided by the error, 1/Hz. Simulated errors are added to the
+    /// response, and the features are found again. In a check with other simulated errors, 95 % of
+    /// the shifts of a feature were below 1.96 standard deviations.
     ///
     /// The error is complex, ε(f) = σ(f) Σₖ zₖ exp(jsₖf)/√n with complex normal zₖ. The sₖ are
     /// normal numbers whose standard deviation s is the slope, so that errors at frequencies Δf

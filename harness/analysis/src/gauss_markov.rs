@@ -23,8 +23,8 @@ pub struct Noise {
 
 /// Kalman filter that turns the rows of one recording into white innovations.
 ///
-/// - `rows`: for each row the decay φ of the bias since the last row, the Kalman gain, and the
-///   reciprocal of the innovation's standard deviation.
+/// - `rows`: for each row the factor φ by which the bias has decayed since the last row, the Kalman
+///   gain, and the reciprocal of the innovation's standard deviation.
 /// - `log_variance`: sum of the logarithms of the innovations' variances.
 pub struct Whitening {
     rows: Vec<[f64; 3]>,

@@ -116,10 +116,10 @@ fn normal(chi_squared: f64, n: f64) -> f64 {
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-/// Returns the largest excess of a level over the median of all levels, as a standard normal
-/// deviate, and the time or the frequency of this level. `levels` are pairs of a level and its time
-/// or frequency; each level is a mean of `n` squares. The conversion to a normal deviate is needed
-/// because the probability of a given excess depends on n.
+/// Returns the excess of the largest of the `levels` over the median of all levels, and its time or
+/// frequency. `levels` are pairs of a level and its time or frequency; each level is a mean of `n`
+/// squares. The excess is returned as a standard normal deviate, because the probability of a given
+/// excess depends on `n`.
 fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
     let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
     // The mean of χ² is needed, which is larger than its median by this factor.

@@ -30,9 +30,8 @@ pub struct OffAxis {
 }
 
 impl OffAxis {
-    /// Computes the median and the energy ratio from the `radial` and the `tangential` force of the
-    /// liquid, N, at every sample, and the root mean square from the `leakage` at every frequency
-    /// ([`leakage`]).
+    /// Computes the three measures from the `radial` and the `tangential` force of the liquid, N,
+    /// at every sample, and from the `leakage` at every frequency, which [`leakage`] returns.
     pub fn from_forces(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
         let (mut off, mut all) = (0.0, 0.0);
         let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());

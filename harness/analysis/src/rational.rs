@@ -77,9 +77,8 @@ impl Rational {
     }
 
     /// Returns the relative standard deviation of the fitted response at `frequencies`, Hz, and the
-    /// standard deviations of its antiresonance and resonance. Each column of the covariance's
-    /// square root is added to the coefficients, and the changes of the results are summed in
-    /// squares.
+    /// standard deviations of its antiresonance and resonance. They are computed by finite
+    /// differences in the directions of the columns of the covariance's square root.
     pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
         let nominal = self.frequency_response(frequencies);
         let found = Features::find(&nominal);

@@ -6,13 +6,14 @@ use crate::statistics;
 use crate::transfer_function::{TransferFunction, fit_time};
 use crate::welch::{Segments, Spectra};
 
-/// A transfer function fitted to a run, with statistics of the residual, which is the rate minus
-/// the rate of the model.
+/// A transfer function fitted to a run, with statistics of the residual, which is the measured rate
+/// minus the rate of the model.
 ///
-/// - `fit_frequency`, `fit_time`: explained part in the frequency domain and in the time domain, %.
+/// - `fit_frequency`, `fit_time`: share of the measurement that the model explains, in the
+///   frequency domain and in the time domain, %.
 /// - `coherence`: mean coherence of residual and torque between antiresonance and resonance; `None`
 ///   if one of them is missing.
-/// - `skewness`, `kurtosis`: 0 and 3 for Gaussian noise.
+/// - `skewness`, `kurtosis`: of the residual; 0 and 3 if it is Gaussian noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelFit {
     pub model: TransferFunction,
@@ -24,10 +25,11 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Fits a transfer function to the response `measured` of a run, and simulates it with the
-    /// run's torque. The signals are sampled every `step` seconds. Returns the fit, and the spectra
-    /// of torque and residual in segments of `segment` seconds; returns `None` if `measured` is
-    /// empty.
+    /// Fits a transfer function to the frequency response `measured` from torque to rate, and
+    /// simulates it with `torque`, N·m. The signals are sampled every `step` seconds. Returns the
+    /// fit, and the averaged spectra of the torque and of the residual (`rate` minus the simulated
+    /// rate) in segments of `segment` seconds. Their coherence is averaged between the antiresonance
+    /// and the resonance in `features`. Returns `None` if `measured` is empty.
     pub fn fit(
         step: f64,
         segment: f64,

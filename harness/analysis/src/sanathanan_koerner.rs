@@ -47,10 +47,10 @@ impl Coefficients {
     }
 }
 
-/// Fits a transfer function to `lines` in `rounds` iterations. If `transient` is true, the fit also
-/// contains the leakage of the record's ends. `solve` solves the linear equations of the last
-/// iteration and may compute further results of type `S`, such as a covariance. Returns `None` if
-/// there are too few lines.
+/// Fits a transfer function to `lines` in `rounds` iterations. If `transient` is true, the fit has
+/// an additional term for the transient, because the ends of a record that is not periodic leak
+/// into its spectra. `solve` solves the linear equations of the last iteration and may compute
+/// further results of type `S`, such as a covariance. Returns `None` if there are too few lines.
 pub fn fit<S>(
     lines: &[Line],
     transient: bool,

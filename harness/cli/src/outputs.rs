@@ -39,9 +39,9 @@ const OUTPUTS: [(&str, &str, &[&str]); 22] = [
 
 const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat", "json", "svg"];
 
-/// Protects the inputs that the command line names from being overwritten. It refuses an output
-/// that would replace an input, that looks like an input, or that is the same file as another
-/// output.
+/// Protects the inputs that the command line names from being overwritten, and checks the outputs.
+/// An output is refused if it would replace such an input or any existing file with an ending that
+/// is usual for inputs, or if two outputs are the same file.
 ///
 /// # Errors
 ///

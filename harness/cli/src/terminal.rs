@@ -8,8 +8,11 @@ use anstream::AutoStream;
 use anyhow::Result;
 use clap::ColorChoice;
 use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use files::input;
 use host::guard;
+
+use crate::commands::values_with_help;
 
 pub const GLOBAL: &str = "Global options";
 
@@ -22,12 +25,21 @@ pub struct Terminal {
     /// Exits with code 1 if there was a warning.
     #[arg(long, global = true, help_heading = GLOBAL)]
     strict: bool,
-    /// Colours of messages. `auto` uses colours on a terminal unless the environment variable NO_COLOR is set.
-    #[arg(long, global = true, help_heading = GLOBAL, value_name = "WHEN", default_value = "auto")]
+    /// Decides when messages have colours.
+    #[arg(long, global = true, help_heading = GLOBAL, value_name = "WHEN", default_value = "auto", value_parser = color_parser())]
     color: ColorChoice,
     /// Internal: prints progress and results as JSON text sequences (RFC 7464), for the Python package.
     #[arg(long, global = true, hide = true)]
     messages: bool,
+}
+
+fn color_parser() -> impl TypedValueParser<Value = ColorChoice> {
+    let values = values_with_help([
+        ("auto", "On a terminal, unless the environment variable NO_COLOR is set"),
+        ("always", "Also in files and pipes"),
+        ("never", "Not at all"),
+    ]);
+    PossibleValuesParser::new(values).try_map(|when: String| when.parse::<ColorChoice>())
 }
 
 static TERMINAL: OnceLock<Terminal> = OnceLock::new();

@@ -40,8 +40,8 @@ pub struct Course<'a> {
 
 impl Inputs {
     /// Selects the inputs `names` of an FMU, which a run then sets at each communication point.
-    /// With `hold` they are constant during each step (zero-order hold); otherwise they follow
-    /// their slopes.
+    /// With `hold` they are constant during each step (zero-order hold); otherwise they change
+    /// linearly.
     ///
     /// # Errors
     ///

@@ -862,8 +862,8 @@ impl<'fmu> Instance<'fmu> {
 struct Line {
     references: Vec<u32>,
     values: Vec<f64>,
-    /// Position in `values`, and position in the list of inputs that the step received, of each
-    /// input that changes within the step.
+    /// For each input that changes within the step: its position in `values`, and its position
+    /// among the inputs of the step.
     moving: Vec<(usize, usize)>,
 }
 

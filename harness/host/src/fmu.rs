@@ -158,7 +158,7 @@ passed_on! {
     /// variable is a structural parameter of FMI 3.0 and the value differs from the value with
     /// which the FMU was opened.
     set(name: &str, text: &str) -> Result<()>;
-    /// Enters event mode. This and the following calls need an FMU that was opened for Model Exchange.
+    /// Enters event mode. The FMU must have been opened for Model Exchange.
     enter_event_mode() -> Called;
     enter_continuous_time_mode() -> Called;
     completed_integrator_step() -> Called<CompletedStep>;

@@ -102,9 +102,9 @@ impl History {
         self.at_row(self.time.partition_point(|row| *row <= t), t)
     }
 
-    /// Returns the value of the input at the time `t`, s, which may have a rounding error because
-    /// it is a sum of steps. A jump at most 1e-9 (1 + |t|) s after `t` counts as having happened,
-    /// so that it is not missed.
+    /// Returns the value of the input at the time `t`, s. If `t` is a sum of steps, it has a
+    /// rounding error. A jump at most 1e-9 (1 + |t|) s after `t` is therefore taken to have
+    /// happened, so that it is not missed.
     pub fn near(&self, t: f64) -> f64 {
         let slack = 1e-9 * (1.0 + t.abs());
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
@@ -239,10 +239,10 @@ pub fn interpolates(description: &ModelDescription) -> bool {
         .is_none_or(|co_simulation| co_simulation.can_interpolate_inputs)
 }
 
-/// Returns an error if an input has slopes, but the FMU cannot interpolate its inputs. If such an
-/// input were held over each step, it would lag, and a row of the result would pair an input with
-/// the response to the previous input. `hold` is the option by which the user can hold inputs
-/// between rows; the message names it.
+/// Returns an error if an input changes linearly between its rows, but the FMU cannot interpolate
+/// its inputs. If the input were held over each step, it would lag, and a row of the result would
+/// pair an input with the response to the previous input. `hold` is the name of the option by which
+/// the user can hold inputs between rows; the error message names it.
 pub fn check_interpolation<'h>(
     description: &ModelDescription,
     inputs: impl IntoIterator<Item = (&'h str, &'h History)>,

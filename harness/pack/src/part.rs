@@ -9,9 +9,9 @@ use host::part::{Limit, START_VALUES, describe};
 
 use crate::archive::{self, Files};
 
-/// Packs a reduced FMU to `out`, which has only those variables of `fmu` that are within `limits`,
-/// for example for one tank. The binary stays the same. `starts` has start values by name that
-/// replace the values in the description.
+/// Writes an FMU to `out` that has only those variables of `fmu` that are within `limits`, for
+/// example the variables of one tank. Its binary is the binary of `fmu`. `starts` has start values
+/// by name that replace the start values in the description.
 ///
 /// # Errors
 ///

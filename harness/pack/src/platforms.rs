@@ -230,7 +230,8 @@ impl Toolchain {
     }
 
     /// Lists the faults of a binary as parts of sentences: the faults `found` by the caller, and
-    /// paths of this machine in the bytes of the binary, which must not be distributed.
+    /// paths of this machine that the bytes contain. A distributed binary must not contain such
+    /// paths.
     pub fn faults(&self, platform: &Platform, bytes: &[u8], found: Vec<String>) -> Vec<String> {
         let private = self.private().into_iter();
         let named = private

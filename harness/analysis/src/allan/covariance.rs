@@ -29,10 +29,10 @@ const RANGE: usize = 2;
 /// ratios the covariance is set to 0.
 const RATIO: usize = 32;
 
-/// Precomputed data from which the covariance matrix of Allan variances follows for any
-/// coefficients of the noise. For each pair of averaging times and each lag they contain the weight
-/// of the lag, and, for each term of the noise with the coefficient 1, the covariance of the gyro
-/// angle's second differences over the two averaging times.
+/// Part of the covariance matrix of Allan variances that does not depend on the coefficients of the
+/// noise. For each pair of averaging times and each lag it contains the weight of the lag. It also
+/// contains, for each term of the noise with the coefficient 1, the covariance of the second
+/// differences of the gyro's angle over the two averaging times.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,

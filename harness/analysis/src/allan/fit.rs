@@ -22,10 +22,11 @@ const ITERATIONS: usize = 12;
 /// Largest number of short averaging times that a fit may leave out, and the longest averaging time
 /// that it may leave out, s.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
-/// Number of octaves of averaging times that a fit leaves out in addition to those that it must
-/// leave out to pass its test. A filter in the gyro reduces the variance at short averaging times.
-/// Its effect halves with each octave, so that an octave which just passes the test can still shift
-/// N by several standard deviations.
+/// Number of octaves of averaging times that a fit leaves out as a margin. A filter in the gyro
+/// reduces the variance at short averaging times. A fit therefore leaves out the shortest octaves
+/// until its test passes, and then this number of further octaves. They are left out because the
+/// effect of the filter only halves with each octave, so that an octave that just passes the test
+/// can still shift N by several standard deviations.
 const BEYOND: usize = 2;
 /// Shortest correlation time of a Gauss–Markov bias, as a multiple of the shortest averaging time.
 /// A bias with a shorter correlation time cannot be distinguished from white noise.
@@ -199,9 +200,10 @@ impl Problem<'_> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
-    /// Returns first estimates of the coefficients, from which [`Problem::iterate_weights`] starts.
-    /// They assume that the relative error of each Allan variance is the square root of its
-    /// averaging time, times a constant, because the weights of the iteration need coefficients.
+    /// Returns first estimates of the coefficients, because the weights of
+    /// [`Problem::iterate_weights`] depend on the coefficients. The first estimates assume that the
+    /// relative error of each Allan variance is proportional to the square root of its averaging
+    /// time.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
@@ -233,10 +235,11 @@ impl Problem<'_> {
         Some(((SHORTEST * first).min(*last), *last))
     }
 
-    /// Repeats the generalized least squares, each time with weights that follow from the last
-    /// result, until the coefficients converge. If `fixed` is a coefficient's index and value, this
-    /// coefficient and the correlation time are not fitted. The precomputed covariances `tables`
-    /// are updated when the correlation time changes.
+    /// Repeats the generalized least squares, each time with weights from the last result, until
+    /// the coefficients of the noise converge. `state` has the first coefficients and the first
+    /// correlation time. If `fixed` is the index and the value of a coefficient, this coefficient
+    /// and the correlation time are not fitted. The precomputed covariances `tables` are updated
+    /// when the correlation time changes.
     fn iterate_weights(
         &self,
         mut state: State,
@@ -289,10 +292,11 @@ impl Problem<'_> {
         Some(state)
     }
 
-    /// Estimates the coefficients with the weights of `state`, without the condition that they are
-    /// not negative. Returns the estimates (with the change of the logarithm of the correlation
-    /// time, if there is one), the matrix that computes them from the measured variances, and their
-    /// covariance.
+    /// Estimates the coefficients of the noise by generalized least squares with the covariance
+    /// matrix `covariance` of the Allan variances, linearised at `state`. Unlike in the final fit, coefficients may be
+    /// negative. Returns the estimates, the matrix that computes them from the measured variances,
+    /// and their covariance. If there is a Gauss–Markov bias, the last estimate is the change of
+    /// the logarithm of its correlation time.
     fn unconstrained(
         &self,
         state: &State,

@@ -28,14 +28,25 @@ pub struct AnalyseArgs {
     /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "RECORDING", required_unless_present_any = ["plan", "bench_day"])]
     recordings: Vec<PathBuf>,
-    /// Column of the recordings that contains each signal, with its unit, such as omega=gyro_z:deg/s. A signal that is
-    /// not named here is read from the column that has the name of the signal.
+    /// Columns of the recordings that contain the signals, with units. For example, omega=gyro_z:deg/s reads the rate
+    /// omega from the column gyro_z in deg/s. A signal that is not named here is read from the column that has the
+    /// name of the signal.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
     columns: Columns,
-    /// Torque profile that was commanded. The amplitude is read from the recording.
+    /// Torque profile that was commanded during the recordings. Its amplitude is read from each recording.
     #[arg(long, value_name = "PROFILE", default_value = "exp-sweep:f0=1.25,f1=3.5,duration=2700")]
     profile: String,
     /// Slosh models to simulate for comparison with the recordings.
+    ///
+    /// - frozen: the whole liquid is rigid
+    ///
+    /// - linear: linear planar pendulums
+    ///
+    /// - planar: nonlinear planar pendulums
+    ///
+    /// - spherical: spherical pendulums, which can rotate (rotary slosh)
+    ///
+    /// - liquid: slosh modes to third order in their amplitude
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear,spherical")]
     model: Vec<String>,
     /// Sets a known parameter of the bench by its name in the FMU, such as tank.h, tank.d, hub.I or friction.b.
@@ -50,7 +61,8 @@ pub struct AnalyseArgs {
     bench_day: Option<PathBuf>,
     #[command(flatten)]
     pub runs: RunsArgs,
-    /// Directory for runs, tables and report.html [default: dist/ and the name of the first recording or of the plan].
+    /// Directory for runs, tables and report.html [default: dist/NAME with the name of the first recording or of the
+    /// plan].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
 }
@@ -85,8 +97,9 @@ impl AnalyseArgs {
         campaign::drive(&fmu, &campaign, store, Vec::new())
     }
 
-    /// Returns the plan that the command line describes: every recording is a run with the
-    /// amplitude of its own torque, and is simulated with every slosh model for comparison.
+    /// Returns the plan that the command line describes. It has a run for each recording, whose
+    /// torque has the amplitude of the recorded torque. Each run is simulated with every slosh
+    /// model, for comparison with the recording.
     fn draft(&self) -> Result<Draft> {
         let profile: Written = self.profile.parse()?;
         let torque = profile.torque()?;

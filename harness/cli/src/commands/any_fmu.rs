@@ -18,22 +18,33 @@ use signals::table::Table;
 use super::estimates::{Out, deviation};
 use crate::terminal;
 
-/// Options for fitting any FMU.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Options for any FMU")]
 pub struct AnyFmuArgs {
-    /// Unknowns to estimate: Real parameters and start values of the FMU, each with an initial guess and optionally
-    /// bounds [default bounds: min and max of the FMU]. NAME@each estimates a separate value of NAME for each
-    /// recording. scale(NAME) is the relative scale error of the input or output NAME; 0 means an exact scale.
+    /// Unknowns to estimate, each with an initial guess and optionally bounds [default bounds: min and max of the
+    /// FMU].
+    ///
+    /// - NAME: a Real parameter or a start value of the FMU
+    ///
+    /// - NAME@each: a separate value of NAME for each recording
+    ///
+    /// - scale(NAME): the relative scale error of the input or output NAME; 0 means an exact scale
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
     /// Prior knowledge of an unknown: its mean and standard deviation.
     #[arg(long, value_name = "NAME=MEAN:STD,…")]
     prior: Vec<String>,
     /// Uncertainty (standard deviation) of values that are taken as known. It widens the 95 % intervals of the
-    /// estimates. NAME is a value given by --set, scale(NAME) the scale of an input or output, and scale(time) the rate
-    /// of the clock. SIZE is relative (0.5% or 0.005) or, for a value given by --set, absolute (5mm, or ±0.1 in the
-    /// unit of the variable); 0 means exact.
+    /// estimates.
+    ///
+    /// - NAME: a value that is given by --set
+    ///
+    /// - scale(NAME): the scale of an input or output
+    ///
+    /// - scale(time): the rate of the clock
+    ///
+    /// SIZE is relative (0.5% or 0.005) or, for a value that is given by --set, absolute (5mm, or ±0.1 in the unit of
+    /// the variable); 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
     /// Inputs of the FMU that are set to the values in the recordings. The values are interpolated linearly between the
@@ -43,9 +54,9 @@ pub struct AnyFmuArgs {
     /// Outputs of the FMU that were recorded.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     outputs: Vec<String>,
-    /// Recorded output that is the reading of a sensor and not a variable of the FMU, such as a wave gauge, described
-    /// as for `hubslosh run --sensor`. Scale, bias and delay of the sensor are known; its noise is estimated. The flag
-    /// may be repeated.
+    /// Sensor, such as a wave gauge, whose readings were recorded as the output NAME; for outputs that are not
+    /// variables of the FMU. It is described as for `hubslosh run --sensor`. Its scale, bias and delay are known; its
+    /// noise is estimated. The option may be repeated.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
     sensors: Vec<Sensor>,
     /// Outputs whose sensor has an unknown constant bias, which is estimated for each recording; STD is the prior
@@ -59,9 +70,11 @@ pub struct AnyFmuArgs {
     /// Models the noise of every output as white noise plus a slowly drifting bias (Gauss–Markov process).
     #[arg(long)]
     drift: bool,
-    /// Solver that simulates the FMU, with its relative tolerance. `own` is the FMU's own solver (Co-Simulation), for
-    /// example own:1e-6; `host` is the solver of this command (Model Exchange), for example host:1e-9 [default
-    /// tolerance of host: 1e-8].
+    /// Solver that simulates the FMU, with its relative tolerance.
+    ///
+    /// - own: the FMU's own solver (Co-Simulation), for example own:1e-6
+    ///
+    /// - host: the solver of this command (Model Exchange), for example host:1e-9; the default tolerance is 1e-8
     #[arg(
         long,
         value_name = "own|host[:TOLERANCE]",
@@ -102,19 +115,19 @@ fn solver(text: &str) -> Result<Stepped> {
 /// the user ends without a good fit.
 const STARTS: usize = 8;
 
-/// Options that request the likelihood at given points instead of a fit.
 #[derive(clap::Args)]
 pub struct PointsArgs {
-    /// Table of points, one column for each unknown. The command then writes −2 ln L, where L is the likelihood of the
-    /// recordings, at each point to --out, for `hubslosh.posterior` in Python, instead of fitting.
+    /// Table of points, with one column for each unknown. Instead of fitting, the command computes −2 ln L at each
+    /// point, where L is the likelihood of the recordings, and writes the values to --out. The function
+    /// `hubslosh.posterior` in Python reads them.
     #[arg(long, hide = true, value_name = "CSV", requires_all = ["free", "found"])]
     points: Option<PathBuf>,
-    /// Result of an earlier identification (.json) whose noise the likelihood uses.
+    /// Result of an earlier identification (.json). Its estimates of the noise are used in the likelihood.
     #[arg(long, hide = true, value_name = "JSON", requires = "points")]
     found: Option<PathBuf>,
 }
 
-/// Options of `identify --free` and `design --free` that these commands also have without `--free`.
+/// Options that `identify` and `design` have both with and without the option `--free`.
 pub struct Request<'a> {
     pub data: &'a [PathBuf],
     pub settings: &'a [(String, String)],

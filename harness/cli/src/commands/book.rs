@@ -15,7 +15,7 @@ use crate::{fmu, terminal};
     after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site"
 )]
 pub struct BookArgs {
-    /// Directory for the book; no browser is opened [default: dist/book].
+    /// Directory for the documentation. If it is given, no browser is opened [default: dist/book].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
     /// Builds the documentation and prints the path of its first page, without opening a browser.

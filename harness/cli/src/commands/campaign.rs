@@ -32,6 +32,16 @@ pub struct CampaignArgs {
     #[arg(long)]
     list: bool,
     /// Slosh models with which each sweep is simulated.
+    ///
+    /// - frozen: the whole liquid is rigid
+    ///
+    /// - linear: linear planar pendulums
+    ///
+    /// - planar: nonlinear planar pendulums
+    ///
+    /// - spherical: spherical pendulums, which can rotate (rotary slosh)
+    ///
+    /// - liquid: slosh modes to third order in their amplitude
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_values = plan::MODELS)]
     model: Vec<String>,
     /// Heights of the liquid in the tank for which the sweeps are simulated, m.
@@ -40,7 +50,7 @@ pub struct CampaignArgs {
     /// Torque amplitudes of the sweeps, N·m.
     #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = plan::AMPLITUDES)]
     amplitudes: Vec<f64>,
-    /// How the frequency of the sweeps grows from 1.25 to 3.5 Hz in 2700 s.
+    /// Growth of the frequency of the sweeps from 1.25 to 3.5 Hz in 2700 s.
     #[arg(long, value_enum, default_value = "exponential")]
     sweep: Sweep,
     /// Sets a parameter or an input by its name in the FMU. A number is in SI units or has a unit of the variable (50mm);
@@ -55,12 +65,12 @@ pub struct CampaignArgs {
     force: bool,
     #[command(flatten)]
     pub runs: RunsArgs,
-    /// Directory for runs, tables and report.html [default: dist/campaign, followed by the flags if they change the
-    /// campaign; with --plan, dist/ and the name of the plan].
+    /// Directory for runs, tables and report.html [default: dist/campaign, to whose name the options that change the
+    /// campaign are appended; with --plan, dist/NAME with the name of the plan].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
-    /// Replaces tables and report if the default directory contains the tables of another plan. Without this flag that is
-    /// an error.
+    /// Replaces the tables and the report of another plan in the default directory. Without this option the command
+    /// refuses to replace them.
     #[arg(long)]
     replace: bool,
 }
@@ -69,12 +79,11 @@ pub struct CampaignArgs {
 /// their hash.
 const LONGEST: usize = 100;
 
-/// Growth of the frequency of `campaign`'s sweep.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Sweep {
-    /// Exponentially in time.
+    /// The frequency grows exponentially with time.
     Exponential,
-    /// Linearly in time.
+    /// The frequency grows linearly with time.
     Linear,
 }
 

@@ -9,11 +9,11 @@ use files::output;
 
 use crate::{fmu, progress, terminal};
 
-/// Checks an FMU 2.0 or 3.0 against the FMI standard and against what hosts need.
+/// Checks an FMU 2.0 or 3.0 against the FMI standard and the needs of simulation tools.
 ///
-/// The check reads archive, description and binaries, and calls the binary for this platform as hosts do. The exit code
-/// is 0 if there are no errors, 1 if there are errors, and 2 if no selected rule could be checked. Warnings do not change
-/// it, unless --strict is given.
+/// The check reads archive, description and binaries, and calls the binary for this platform as hosts do. The exit
+/// code is 0 if there are no errors, 1 if there are errors, and 2 if no selected rule could be checked. Warnings do
+/// not change it, unless --strict is given.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh check dist/HubSlosh.fmu\n  \
     hubslosh check other.fmu --only zip,xml --junit check.xml\n  hubslosh check --rules")]

@@ -1,6 +1,6 @@
 use anyhow::Result;
 
-/// Prints a script by which a shell completes commands and flags of hubslosh.
+/// Prints a script with which a shell completes the commands and options of hubslosh.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh completions bash > ~/.local/share/bash-completion/completions/hubslosh\n  \

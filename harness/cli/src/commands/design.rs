@@ -84,10 +84,10 @@ pub struct DesignArgs {
     /// Tables with the inputs that you plan to apply; only with --free, which names the parameters to estimate.
     #[arg(value_name = "DATA", requires = "free")]
     data: Vec<PathBuf>,
-    /// Standard deviation of the noise in one sample of each output; only with --free.
+    /// Standard deviation of the noise in one sample of each output, in the unit of the output; only with --free.
     #[arg(long, value_name = "OUTPUT=STD,…", requires = "free")]
     noise: Vec<String>,
-    /// Column of the tables that contains each input, with its unit; only with --free.
+    /// Columns of the tables that contain the inputs, with units, such as torque[3]=T:mNm; only with --free.
     #[arg(
         long,
         value_name = "INPUT=COLUMN[:UNIT],…",
@@ -218,8 +218,8 @@ impl DesignArgs {
         Ok((time, tau, factor))
     }
 
-    /// Computes the bounds for a linear sweep with the peak `peak`, N·m, at the times `time`, s.
-    /// The peak is reduced if the slosh angle would exceed its limit.
+    /// Computes the Cramér–Rao bounds for a linear sweep with the peak torque `peak`, N·m, at the
+    /// times `time`, s. The peak is reduced if the slosh angle would exceed its limit.
     fn sweep(&self, bench: &Bench, time: &[f64], peak: f64) -> Result<Sweep> {
         let (f0, f1) = (self.band[0], self.band[1]);
         let written = |peak: f64| {
@@ -266,8 +266,8 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
 
 struct Bench<'f> {
     fmu: &'f Fmu,
-    /// Settings of the FMU. If they contain no damping ratio of the slosh, the FMU computes it by
-    /// its correlation of measured damping.
+    /// Settings of the FMU. If they contain no damping ratio of a slosh mode, the FMU computes it
+    /// from a correlation of measurements.
     setup: Setup,
     sensor_errors: bool,
     noise: Noise,

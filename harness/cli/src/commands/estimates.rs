@@ -49,8 +49,9 @@ impl Out<'_> {
         }
     }
 
-    /// Saves a result, to whose steps `notes` are added at the beginning, prints its tables, and writes its report. If the
-    /// result cannot be trusted, prints a warning, which `--strict` makes an error.
+    /// Adds `notes` at the beginning of the result's steps, saves the result, prints its tables,
+    /// and writes its report. If the result cannot be trusted, prints a warning, which `--strict`
+    /// makes an error.
     ///
     /// # Errors
     ///

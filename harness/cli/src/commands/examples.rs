@@ -5,7 +5,7 @@ use files::output;
 
 use crate::fmu;
 
-/// Lists the examples in Python, or copies them to a folder of your own.
+/// Lists the example scripts in Python, or copies them to a folder of your own.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh examples\n  hubslosh examples --copy mine && python mine/0_your_own_tank/my_tank.py"

@@ -23,11 +23,13 @@ const DEFAULT_GYRO: &str = "dist/gyro";
     --out rest.parquet\n  \
     hubslosh gyro --recording rest.parquet --columns omega=omega_imu")]
 pub struct GyroArgs {
-    /// Recording of a gyro at rest: text in columns, Parquet or another kind of recording.
+    /// Recording of a gyro at rest: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python
+    /// package is installed.
     #[arg(long, value_name = "FILE")]
     recording: PathBuf,
     /// Columns of the recording that contain the signals time and omega, with units, such as
-    /// time=t:ms,omega=gyro_z:deg/s.
+    /// time=t:ms,omega=gyro_z:deg/s. A signal that is not named here is read from the column that has the name of the
+    /// signal.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
     columns: Columns,
     /// Sampling rate of a recording without times, Hz.
@@ -70,7 +72,7 @@ impl GyroArgs {
     }
 }
 
-/// Length, s, up to which autocorrelation is computed.
+/// Longest lag of the autocorrelation, s.
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
 const CHUNKS: f64 = 8.0;

@@ -19,12 +19,13 @@ use signals::recording::Columns;
 
 use super::any_fmu::{AnyFmuArgs, PointsArgs, Request};
 use super::estimates::Out;
-use super::{DEFAULT_FMU, open, setting};
+use super::{DEFAULT_FMU, open, setting, values_with_help};
 use crate::terminal;
 
 /// Estimates parameters of an FMU from recordings, with their uncertainties.
 ///
-/// Without a kind of recording, `identify DATA` means `identify bench DATA`, and with --free `identify fmu DATA`.
+/// If the kind of recording is omitted, `identify DATA` means `identify bench DATA`, or `identify fmu DATA` if --free
+/// is given.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \
@@ -47,7 +48,6 @@ const DECAY: &str =
 const FRICTION: &str =
     "Example:\n  hubslosh identify friction ramp.csv step.csv sweep.csv --out friction.json";
 
-/// Kind of the recordings, which decides what is fitted to them.
 #[derive(clap::Subcommand)]
 enum Kind {
     /// Fits tank, hub, bearing and sensors of the slosh bench to torque and rate.
@@ -62,7 +62,8 @@ enum Kind {
     /// The option --free names the parameters and start values to fit.
     #[command(after_help = FMU)]
     Fmu(Box<FmuArgs>),
-    /// Estimates frequency and damping over the amplitude from a free decay, a signal without torque.
+    /// Estimates frequency and damping ratio, and their change with the amplitude, from a free decay (a recording
+    /// without torque).
     #[command(after_help = DECAY)]
     Decay(Box<DecayArgs>),
     /// Fits friction and inertia of the bench to recordings in which no liquid moves, such as ramps, steps and sweeps
@@ -73,18 +74,23 @@ enum Kind {
     Friction(Box<FrictionArgs>),
 }
 
-/// Recordings, and where the results go.
 #[derive(clap::Args)]
 struct DataArgs {
     /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
-    /// Column of the recordings that contains each signal, with its unit. For example, time=t:ms,omega=gyro_z:deg/s
-    /// reads the time from the column t in ms, and the rate from the column gyro_z in deg/s. The signals of `bench` and
-    /// `friction` are time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x and omega_y; the signals of `decay`
-    /// are time, wave_height, force, theta and omega; the signals of `fmu` are time and the inputs and outputs of the
-    /// FMU. A signal that is not named here is read from the column that has the name of the signal. rate=HZ is the
-    /// sampling rate of a recording without times.
+    /// Columns of the recordings that contain the signals, with units. For example, time=t:ms,omega=gyro_z:deg/s
+    /// reads the time from the column t in ms, and the rate from the column gyro_z in deg/s. A signal that is not
+    /// named here is read from the column that has the name of the signal. rate=HZ is the sampling rate of a
+    /// recording without times.
+    ///
+    /// The signals are:
+    ///
+    /// - bench and friction: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x and omega_y
+    ///
+    /// - decay: time, wave_height, force, theta and omega
+    ///
+    /// - fmu: time, and the inputs and outputs of the FMU
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -100,7 +106,6 @@ struct DataArgs {
     report: Option<PathBuf>,
 }
 
-/// Options that state known properties of a bench and of its sensors.
 #[derive(clap::Args)]
 struct KnownArgs {
     /// Sets a known parameter of the bench by its name in the FMU. A parameter that is set is not estimated.
@@ -114,11 +119,14 @@ struct KnownArgs {
     /// if given, is the standard deviation of prior knowledge about the value.
     #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = parse_start)]
     starts: Vec<(String, f64, Option<f64>)>,
-    /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as by a sampled controller)
-    /// or smooth (band-limited, as in a sampled recording of a smooth torque) [default: the behaviour that fits best].
-    #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
+    /// Intersample behaviour of the torque [default: the behaviour that fits best].
+    #[arg(long, value_name = "HOW", value_parser = values_with_help([
+        ("linear", "Straight lines between the samples (first-order hold)"),
+        ("held", "Each sample is held until the next (zero-order hold), as by a sampled controller"),
+        ("smooth", "Band-limited, as in a sampled recording of a smooth torque"),
+    ]))]
     torque: Option<String>,
-    /// Uses only the rows from the first to the second of these times, s.
+    /// Uses only the rows between these two times, s.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
     /// Recording for validation: the fitted model simulates it, but it is not used for the fit.
@@ -135,13 +143,18 @@ pub struct BenchArgs {
     data: DataArgs,
     #[command(flatten)]
     known: KnownArgs,
-    /// Slosh models to try; the command chooses one of them by the fit.
+    /// Slosh models to try. The command chooses the model that fits best.
     #[arg(
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
         default_value = "frozen,linear,planar,spherical",
-        value_parser = ["frozen", "linear", "planar", "spherical"]
+        value_parser = values_with_help([
+            ("frozen", "The whole liquid is rigid"),
+            ("linear", "Linear planar pendulums"),
+            ("planar", "Nonlinear planar pendulums"),
+            ("spherical", "Spherical pendulums, which can rotate (rotary slosh)"),
+        ])
     )]
     model: Vec<String>,
     /// Friction laws to try. The first law is combined with every slosh model; the other laws are then tried with the
@@ -151,20 +164,28 @@ pub struct BenchArgs {
         value_name = "NAME,…",
         value_delimiter = ',',
         default_value = "stribeck",
-        value_parser = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"]
+        value_parser = values_with_help([
+            ("none", "Bearing without friction"),
+            ("viscous", "Friction proportional to the rate"),
+            ("stribeck_smooth", "Stribeck curve with a smoothed sign: the hub creeps and never sticks"),
+            ("stribeck", "Stribeck curve as a set-valued law: the hub can stick"),
+            ("lugre", "LuGre model: bristles that deflect before they slide"),
+        ])
     )]
     friction: Vec<String>,
-    /// Estimates further effects: actuator_lag, the time constant of the actuator; gyro_lag, the time constant of a
-    /// filter in the gyro; friction_drift, the relative change of the friction over a recording; breaking, the damping
-    /// by breaking waves (slosh.zeta_breaking and slosh.breaking_steepness). With early_rate the delay of the rate may
-    /// be negative, because its time stamps may be too early. With none the delay, the gyro bias and the friction
-    /// asymmetry, which are estimated by default, are not estimated.
+    /// Effects to estimate in addition to delay, gyro bias and friction asymmetry, which are estimated by default.
     #[arg(
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
-        value_parser =
-            ["actuator_lag", "gyro_lag", "friction_drift", "breaking", "early_rate", "none"]
+        value_parser = values_with_help([
+            ("actuator_lag", "Time constant of the actuator"),
+            ("gyro_lag", "Time constant of a filter in the gyro"),
+            ("friction_drift", "Relative change of the friction over a recording"),
+            ("breaking", "Damping by breaking waves (slosh.zeta_breaking and slosh.breaking_steepness)"),
+            ("early_rate", "The delay of the rate may be negative, because its time stamps may be too early"),
+            ("none", "Delay, gyro bias and friction asymmetry are not estimated"),
+        ])
     )]
     also: Vec<String>,
 }
@@ -184,7 +205,7 @@ pub struct DecayArgs {
     /// Relative standard deviation of the rate of the recorder's clock. It widens the 95 % interval of the frequency.
     #[arg(long = "tolerance", value_name = "clock=SIZE")]
     tolerances: Vec<String>,
-    /// Uses only the rows from the first to the second of these times, s.
+    /// Uses only the rows between these two times, s.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
 }
@@ -205,8 +226,7 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
-/// List of the options of older versions, and of the values of `--method`, that were removed, each
-/// with its replacement.
+/// Removed options, and removed values of `--method`, of older versions, each with its replacement.
 const REMOVED: &str = include_str!("removed.txt");
 
 /// Adds the kind of recording to a command line `identify DATA`, which names no kind: `fmu` if

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use clap::builder::PossibleValue;
 use host::fmu::Fmu;
 use signals::table::{self, Table};
 
@@ -31,10 +32,16 @@ pub mod torque;
 pub mod variables;
 pub mod view;
 
+/// Returns the values of an option for its parser. `all` are pairs of a value and its meaning, which the help lists.
+pub fn values_with_help<const N: usize>(
+    all: [(&'static str, &'static str); N],
+) -> [PossibleValue; N] {
+    all.map(|(value, meaning)| PossibleValue::new(value).help(meaning))
+}
+
 pub const DEFAULT_FMU: &str = "HubSlosh";
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
-/// Options of commands that make many runs.
 #[derive(clap::Args)]
 pub struct RunsArgs {
     /// Number of runs that are simulated at the same time [default: the number of cores].

@@ -18,7 +18,7 @@ use crate::set_file;
                   hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
 )]
 pub struct PackArgs {
-    /// The FMU to pack.
+    /// FMU to pack: HubSlosh, Spacecraft or SloshTank.
     #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
     model: &'static Model,
     /// Version of FMI, 2 or 3. The binary is the same for both.
@@ -35,23 +35,23 @@ pub struct PackArgs {
     /// aarch64-linux. Like --all-platforms it needs the tools for building for other platforms.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "python", conflicts_with = "all_platforms", value_parser = platforms::platform)]
     platform: Vec<&'static Platform>,
-    /// Packs the source as an sdist instead, from which pip builds the Python package.
+    /// Packs the source of the Python package as an sdist, from which pip builds the package, instead of an FMU.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
     /// File for the FMU, or folder for wheels and sdist [default for an FMU: dist/NAME.fmu, dist/NAME-fmi3.fmu or
     /// dist/NAME-fmi3-arrays.fmu; for wheels and sdist: dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// Number of tanks whose variables the model description contains, for hosts that show every variable to the user.
-    /// Spacecraft has 4 tanks, and its binary is the same for any number.
+    /// Number of tanks of Spacecraft, 1 to 4, whose variables the model description contains. With fewer tanks, hosts
+    /// that show every variable to the user have a shorter list. The binary is the same for any number.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     tanks: Option<usize>,
     /// Number of slosh modes per tank whose variables the model description contains. Without this option Spacecraft and
     /// SloshTank have 3 modes, and HubSlosh has 10. The option changes only the model description, not the binary.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
-    /// Number of modes of flexible appendages whose variables the model description contains. This option needs --tanks
-    /// or --modes. Spacecraft has 6 such modes [default: 0].
+    /// Number of modes of flexible appendages of Spacecraft, 0 to 6, whose variables the model description contains.
+    /// This option needs --tanks or --modes [default: 0].
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     appendages: Option<usize>,
     /// File of parameters (.toml, .ssv, .json) that become the start values of the FMU, so that a host does not have to set

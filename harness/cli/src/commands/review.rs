@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-/// Reviews the attitude controller of a craft over its fills and writes one page: margins, slosh modes, worst case.
+/// Reviews the attitude controller of a craft at all fills of its tanks, and writes a page with stability margins,
+/// slosh modes and the worst case.
 ///
 /// Several projects, or one with several cases, are compared on one page. The exit code is 1 if a requirement fails.
 /// The command needs a Python with the packages hubslosh and matplotlib.
@@ -15,7 +16,8 @@ use anyhow::{Context, Result, bail, ensure};
                   hubslosh review first.toml second.toml --out comparison.html\n  \
                   hubslosh review project.toml --out review.html --python /usr/bin/python3")]
 pub struct ReviewArgs {
-    /// Project with craft, controller, fills, ranges of uncertain parameters, requirements and cases, .toml.
+    /// Project file, .toml, with the craft, its controller and fills, the ranges of uncertain parameters,
+    /// requirements and cases.
     #[arg(value_name = "PROJECT", required = true)]
     projects: Vec<PathBuf>,
     /// File for the page, .html [default: the name of the project with .html; if several projects are compared,

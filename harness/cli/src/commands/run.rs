@@ -30,17 +30,19 @@ pub struct RunArgs {
         required_unless_present = "input"
     )]
     profile: Option<String>,
-    /// File with histories of inputs over the column time: text in columns, Parquet or another kind of recording. Each
-    /// column with the name of an input of the FMU, such as tau_cmd, tau_ext or g_axial, drives this input. Its unit is
-    /// the unit in the file (`tau_cmd [mNm]`) or otherwise the unit of the FMU; times without a unit are in s. A column
-    /// tau_slope is the derivative of tau_cmd until the next row.
+    /// Table of inputs over the column time: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the
+    /// Python package is installed. Each column with the name of an input of the FMU, such as tau_cmd, tau_ext or
+    /// g_axial, drives this input.
+    ///
+    /// The unit of a column is stated in its heading (`tau_cmd [mNm]`); otherwise it is the unit of the FMU. Times
+    /// without a unit are in s. A column tau_slope is the derivative of tau_cmd until the next row.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
     /// Ignores columns of --input that do not name an input of the FMU. Without this flag such a column is an error.
     #[arg(long, requires = "input")]
     ignore_columns: bool,
-    /// File of parameters, which are set before the parameters given by --set: TOML with lines `"name" = value`, .ssv
-    /// of SSP, or the .json that `hubslosh identify` writes.
+    /// File of parameters: TOML with lines `"name" = value`, .ssv of SSP, or the .json that `hubslosh identify`
+    /// writes. A parameter that is also given by --set has the value of --set.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Sets a parameter or an input by its name in the FMU. A number is in SI units or has a unit of the variable (50mm);
@@ -52,9 +54,9 @@ pub struct RunArgs {
     /// of --input, and to every jump and torque value of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
-    /// Time between the torque values into which an oscillating profile (such as a sine or a sweep) is divided, s. The
-    /// values are joined by straight lines, or held with --hold. If straight lines would differ from the profile by
-    /// more than 2.5 % of its amplitude, shorter times are used, so that they differ by at most 0.1 %.
+    /// Time between the torque values of an oscillating profile, such as a sine or a sweep, s. The values are joined
+    /// by straight lines, or held with --hold. If straight lines would differ from the profile by more than 2.5 % of
+    /// its amplitude, shorter times are used, so that they differ by at most 0.1 %.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE, conflicts_with = "input")]
     sample: f64,
     /// Time at which the run stops, s [default: the end of the torque history].
@@ -74,13 +76,19 @@ pub struct RunArgs {
     /// the run computes the Bond number, and warns if the Bond number is low [default: 0.07213, the value of water].
     #[arg(long, value_name = "N/M")]
     tension: Option<f64>,
-    /// Variables to record in addition to time and the driven inputs [default: for HubSlosh omega, omega_imu,
-    /// slosh_angle and slosh_angle_radial; for other FMUs all outputs and slosh angles; for every FMU also the
-    /// variables from which `hubslosh view` draws further slosh modes and draining tanks].
+    /// Variables to record in addition to time and the driven inputs.
+    ///
+    /// The default is:
+    ///
+    /// - for HubSlosh: omega, omega_imu, slosh_angle and slosh_angle_radial
+    ///
+    /// - for other FMUs: all outputs and slosh angles
+    ///
+    /// - for every FMU also: the variables of further slosh modes and of draining tanks that `hubslosh view` draws
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Also records a sensor with its sampling rate, delay, noise, bias and resolution. The kinds of sensors are listed
-    /// at the end of this help; the flag may be repeated.
+    /// Also records the readings of a sensor with its sampling rate, delay, noise, bias and resolution. The kinds of
+    /// sensors are listed at the end of this help; the option may be repeated.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…")]
     sensors: Vec<Sensor>,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
@@ -227,10 +235,10 @@ impl RunArgs {
     }
 }
 
-/// Returns the columns to record by default. For the bench these are four signals; for another FMU
-/// they are all numeric outputs and the slosh angles, as in a campaign. In addition they are the
-/// quantities that `hubslosh view` draws: the displacements of the bench's second and further slosh
-/// modes, and the liquid left in draining tanks.
+/// Returns the columns to record by default. For HubSlosh (the FMU of the bench) these are four
+/// signals; for another FMU they are all numeric outputs and the slosh angles, as in a campaign.
+/// Quantities that only `hubslosh view` needs are added: the displacements of the bench's second
+/// and further slosh modes, and the liquid left in draining tanks.
 fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,

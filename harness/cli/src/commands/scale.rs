@@ -22,7 +22,8 @@ pub struct ScaleArgs {
 
 #[derive(Subcommand)]
 enum Scale {
-    /// Prints the numbers of section 7.2 of Rubaga's thesis, as printed in the thesis and as computed by this command.
+    /// Prints Bond numbers, accelerations and tank sizes of section 7.2 of Rubaga's thesis, as printed in the thesis
+    /// and as computed by this command.
     #[command(after_help = "Example:\n  hubslosh scale thesis")]
     Thesis,
     /// Computes the Bond number of a tank, and the flight tank with the same Bond number.
@@ -81,8 +82,8 @@ enum Scale {
         #[arg(long, default_value_t = 0.005)]
         flight_alpha: f64,
     },
-    /// Computes the factors by which quantities of a scale model are multiplied to obtain quantities at full size, by
-    /// equal Froude numbers.
+    /// Computes the factors from a scale model to full size, for example for time, force and pressure, that follow
+    /// from equal Froude numbers.
     #[command(after_help = "Example:\n  hubslosh scale froude --lambda 25 --density-ratio 1.14")]
     Froude {
         /// Scale factor: a length at full size divided by the same length of the model.

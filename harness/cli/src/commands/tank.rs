@@ -30,16 +30,19 @@ pub struct TankArgs {
     /// a box.
     #[arg(value_name = "TANK.toml")]
     tank: PathBuf,
-    /// Height of the free surface above the lowest point of the tank, m; or, with a % sign, share of the volume of the
-    /// tank (of an open tank up to the end of its wall). A full tank has no free surface and no modes.
+    /// Height of the free surface above the lowest point of the tank, m; or, with a % sign, share of the volume of
+    /// the tank. The volume of an open tank ends at the upper end of its wall. A full tank has no free surface and no
+    /// modes.
     #[arg(long, value_name = "METRES|PERCENT%", required_unless_present_any = ["sweep", "fill_mass"])]
     fill: Option<Fill>,
     /// Mass of the liquid, kg, instead of --fill.
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
-    /// Several fills, m or %, at which the modes are computed for a table (CSV). With --parameters the command writes
-    /// the fill table with which an FMU simulates a draining tank. Two fills are the ends of this table, and the
-    /// command chooses the points between them; 3 to 12 fills are the points of the table.
+    /// Computes the modes at several fills, m or %, and writes a table (CSV).
+    ///
+    /// With --parameters the command writes the fill table with which an FMU simulates a draining tank: 3 to 12 fills
+    /// are the points of this table. If only two fills are given, they are its ends, and the command chooses the
+    /// points between them.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
     /// Number of lateral modes, 1 to 20.
@@ -67,17 +70,19 @@ pub struct TankArgs {
     /// Number of the tank, 1 to 4, in the parameters that --parameters writes for Spacecraft.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m²/s. With it the command computes damping ratios and their intervals
-    /// at --gravity, for the table, --out and --parameters (with --sweep at every fill) [default: no viscosity, all damping
-    /// ratios are 0].
+    /// Kinematic viscosity of the liquid, m²/s. From it the command computes the damping ratio of each mode, with an
+    /// interval of its uncertainty, at the acceleration --gravity. The table, --out and --parameters contain the damping
+    /// ratios; with --sweep they are computed at every fill [default: no viscosity, all damping ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
-    /// Surface tension, N/m. It changes the frequencies and the damping at --gravity, and gives each mode a stiffness
-    /// that centres the liquid, which --parameters writes [default: no surface tension].
+    /// Surface tension of the liquid, N/m [default: no surface tension]. It changes the frequencies and the damping
+    /// at --gravity. It also gives each mode a stiffness, which --parameters writes: the surface tension returns a
+    /// displaced liquid to its rest position, even without gravity.
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
-    /// Contact angle between surface and wall, degrees; 90 is a flat surface. For an upright cylinder, the frequency and
-    /// the centring stiffness of the first mode then include the meniscus at --gravity and --sigma.
+    /// Contact angle between surface and wall, degrees; with 90 the surface is flat. For an upright cylinder, the
+    /// meniscus at --gravity and --sigma then changes the frequency and the surface-tension stiffness of the first
+    /// mode.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
     /// Rate at which tank and liquid rotate about the axis of the tank, rad/s. The command then computes the surface,
@@ -191,9 +196,9 @@ impl TankArgs {
         }
     }
 
-    /// Returns the path of `--parameters` and the text for this file, in the format of the path's
-    /// ending. The result is `None` without the option. `make` computes the parameters for an FMU
-    /// and a liquid.
+    /// Returns the path of `--parameters` and the text to write there, or `None` without this
+    /// option. `make` computes the parameters for an FMU and a liquid; the ending of the path
+    /// decides their format.
     fn set_file(
         &self,
         make: impl Fn(Target, Liquid) -> Result<ParameterSet, Problems>,

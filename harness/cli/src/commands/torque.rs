@@ -24,7 +24,8 @@ pub struct TorqueArgs {
     /// Largest time between rows, s.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     step: f64,
-    /// Time between the torque values into which an oscillating profile is divided, s, as for `hubslosh run --sample`.
+    /// Time between the torque values of an oscillating profile, such as a sine or a sweep, s. The values are joined
+    /// by straight lines, or held with --hold. `hubslosh run` has the same option.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     sample: f64,
     /// Holds each torque value of the profile until the next value (zero-order hold) instead of interpolating linearly.

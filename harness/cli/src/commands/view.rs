@@ -44,7 +44,8 @@ pub struct ViewArgs {
     /// given by --set replace those in this file.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// Sets a parameter of the run, if the file of the run does not contain it.
+    /// Gives the value of a parameter with which the run was simulated. This is needed if the file of the run does
+    /// not contain the parameter.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// FMU of the run: a file, or the name of an FMU of this project [default: the FMU that the file of the run names,
@@ -190,9 +191,9 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     Ok(Table::new(table.names().to_vec(), table.names().iter().map(column).collect()))
 }
 
-/// Number of intervals into which each segment of a drawn contour is divided. The range of the
-/// liquid's mass is divided into four times as many intervals, and the height of the surface is
-/// computed at their ends.
+/// Number of intervals into which each segment of a contour is divided for drawing. The range from
+/// an empty to a full tank is divided into four times as many intervals of the liquid's mass, for
+/// the table of surface heights.
 const POINTS: usize = 24;
 
 const STEPS: usize = 80;

@@ -95,9 +95,9 @@ fn lengths(all: usize) -> Vec<usize> {
 }
 
 impl Instance<'_> {
-    /// Calls the functions that take arrays with guard bytes around every array, and returns the
-    /// places where the FMU has written beyond an array or into an input. It also checks calls that
-    /// the FMU refuses.
+    /// Calls the functions that take arrays with guard bytes around every array. Returns the places
+    /// where the FMU has written beyond an array, or into an array that it may only read. Calls
+    /// that the FMU refuses are checked, too.
     pub fn find_stray_writes(&mut self, lists: &Lists) -> Vec<StrayWrite> {
         let mut found = Vec::new();
         self.begin_call();

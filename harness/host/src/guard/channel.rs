@@ -184,8 +184,8 @@ impl Process {
         Ok((process, numbers, pipe))
     }
 
-    /// Takes over the connection from stdin. Returns the connection and the request of the parent.
-    /// There is no pipe on this system.
+    /// Takes over the connection from stdin. Returns the connection, the request of the parent, and
+    /// `None`, because the output of the process needs no pipe on this system.
     #[cfg(not(unix))]
     pub fn take() -> Result<(Process, [u64; REQUEST], Option<File>)> {
         use std::os::windows::io::AsHandle;

@@ -14,8 +14,8 @@ pub struct Documentation {
     pub figures: BTreeMap<String, Vec<u8>>,
 }
 
-/// Renders the page `introduction`, and the pages in its lists, as one page of HTML with the title
-/// `title`. Paths are relative to `root`.
+/// Renders the page `introduction`, and all pages to which its lists link, as one page of HTML with
+/// the title `title`. Paths are relative to `root`.
 ///
 /// # Errors
 ///
