@@ -196,10 +196,11 @@ impl Start {
     }
 }
 
-/// Returns the frequency of the largest line in the spectrum of a signal between `low` and `top`,
-/// Hz. Each sample is assigned to the nearest point of an equally spaced grid, so that one Fourier
-/// transform serves samples with any spacing. Below the Nyquist frequency of this grid the error is
-/// negligible.
+/// Returns the frequency of the largest line in the spectrum of a signal between the frequencies
+/// `low` and `top`, Hz. `weighted` are the samples of the signal at the times `time`, s, multiplied
+/// by a window. Each sample is assigned to the nearest point of an equally spaced grid, so that one
+/// Fourier transform serves samples with any spacing. Below the Nyquist frequency of this grid the
+/// error is negligible.
 fn largest_line(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;

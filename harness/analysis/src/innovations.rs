@@ -27,8 +27,8 @@ const FEWEST_LINES: usize = 4;
 /// tests exceeds it with the probability 1e-4.
 pub const LIMIT: f64 = 5.0;
 
-/// Results of the tests of a residual. They are in standard deviations of the result that pure
-/// noise would give.
+/// Results of the tests of a residual, as multiples of the standard deviation that the result would
+/// have if the residual were pure noise.
 ///
 /// - `whiteness`: result of the whiteness test.
 /// - `in_time`: largest excess of the power in a time window, and the time of the window, s.

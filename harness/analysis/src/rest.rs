@@ -53,7 +53,8 @@ pub struct Rest {
 ///
 /// - `kolmogorov`: Kolmogorov–Smirnov distance of the readings from the normal distribution with
 ///   their mean and variance, multiplied by √n − 0.01 + 0.85/√n for n readings (Stephens).
-///   Quantisation with the step Δ raises the distance of normal readings to about Δ √n/(2σ√(2π)).
+///   Quantisation with the step Δ raises the distance of normal readings with the standard
+///   deviation σ to about Δ √n/(2σ√(2π)).
 /// - `between_levels`: Kolmogorov–Smirnov distance as in `kolmogorov`, but evaluated only midway
 ///   between the levels of the readings, where quantisation has no effect. The variance of the
 ///   readings is reduced by the variance of the quantisation error, Δ²/12 (Sheppard).

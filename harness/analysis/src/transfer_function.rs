@@ -187,9 +187,9 @@ pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
     100.0 * (1.0 - (miss / spread).sqrt())
 }
 
-/// Returns a start of the search with lightly damped poles at the measured resonance, and the zeros
-/// that fit best with these poles. It is needed because the weights in Sanathanan and Koerner's
-/// iteration, which gives the other start, may hide a narrow resonance.
+/// Returns start values for the search: lightly damped poles at the measured resonance, and the
+/// zeros that fit best with these poles. They are needed because the weights in Sanathanan and
+/// Koerner's iteration, which gives the other start values, may hide a narrow resonance.
 fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let pole_omega = TAU * Features::find(measured).f_res?;
     let (real_pole, pole_damping) = (0.01 * pole_omega, 0.01);
@@ -214,8 +214,8 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
 
 const ROUNDS: usize = 30;
 
-/// Returns a start of the search by Sanathanan and Koerner's iteration, in which the input has the
-/// constant spectrum 1 and the output has the measured response as its spectrum.
+/// Returns start values for the search from Sanathanan and Koerner's iteration. In this iteration
+/// the input has the constant spectrum 1, and the spectrum of the output is the measured response.
 fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let count = measured.frequency.len();
     let middle = TAU * measured.frequency.get(count / 2)?;

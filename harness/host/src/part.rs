@@ -178,8 +178,8 @@ fn fnv(bytes: &[u8]) -> u128 {
     })
 }
 
-/// Splits the name of an array element into the name of the array in the FMU's table and the
-/// indices. For example `tank[1].p[2,3]` becomes `tank[].p` and 1, 2, 3.
+/// Splits the name of an array element into a name without indices, as [`Limit::arrays`] has it,
+/// and the indices. For example, `tank[1].p[2,3]` becomes `tank[].p` and 1, 2, 3.
 fn pattern(name: &str) -> (String, Vec<usize>) {
     let (mut text, mut indices, mut rest) = (String::new(), Vec::new(), name);
     while let Some((before, after)) = rest.split_once('[') {

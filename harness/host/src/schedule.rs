@@ -19,8 +19,8 @@ const SAME: f64 = 1e-6;
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 
-/// Returns the words that describe the course of the inputs between two rows in the metadata of a
-/// result file. `hold` is true for a zero-order hold.
+/// Returns the words in the metadata of a result file that state how the inputs change between two
+/// rows. `hold` is true for a zero-order hold.
 pub const fn between(hold: bool) -> &'static str {
     if hold { "held from row to row" } else { "straight lines between rows" }
 }

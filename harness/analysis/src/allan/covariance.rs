@@ -77,7 +77,8 @@ impl Covariance {
     }
 
     /// Returns the covariance matrix of the Allan variances at all averaging times. `coefficients`
-    /// are the coefficients of the noise, such as N² and B², in the order of the terms.
+    /// are the coefficients of the noise, such as N² and B², in the order of the `terms` in
+    /// [`Covariance::new`].
     pub fn matrix(&self, coefficients: &[f64]) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(self.size, self.size);
         let ramp = self.terms.iter().zip(coefficients).find(|(term, _)| **term == Term::Ramp);

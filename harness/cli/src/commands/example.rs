@@ -5,8 +5,8 @@ use experiments::example::Example;
 
 use super::{DEFAULT_FMU, open};
 
-/// Simulates the reference example of an FMU and writes its inputs and outputs to modelDescription/NAME/extra, from where
-/// they are packed into the FMU.
+/// Simulates the reference example that is part of an FMU. The inputs and outputs are written to
+/// modelDescription/NAME/extra, from where `hubslosh pack` packs them into the FMU.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh pack && hubslosh example\n  \
     hubslosh example --fmu Spacecraft")]

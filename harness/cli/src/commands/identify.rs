@@ -112,7 +112,21 @@ struct KnownArgs {
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Uncertainty (relative standard deviation) of values that are taken as known. It widens the 95 % intervals of the
-    /// estimates; 0 means exact [default: torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%,gyro_scale=1%].
+    /// estimates; 0 means exact.
+    ///
+    /// The values are:
+    ///
+    /// - torque: ratio of the acting torque to the recorded torque [default: 1%]
+    ///
+    /// - clock: rate of the recorder's clock [default: 0.01%]
+    ///
+    /// - g_axial: acceleration along the axis [default: 0.1%]
+    ///
+    /// - tank.r: distance of the tank from the axis [default: 0.4%]
+    ///
+    /// - fluid.rho: density of the liquid [default: 0.3%]
+    ///
+    /// - gyro_scale: scale factor of the gyro [default: 1%]
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     tolerances: Vec<String>,
     /// Initial guess from which the search for a parameter starts; without it the guess is computed from the data. STD,

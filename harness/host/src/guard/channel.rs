@@ -32,8 +32,8 @@ pub struct Parent {
     end: End,
     nonce: [u8; NONCE],
     bytes: Vec<u8>,
-    /// True if the connection carried bytes that do not begin with the nonce, so that something
-    /// other than our own code has written to it.
+    /// True if the connection carried bytes that do not begin with the nonce of this connection, so
+    /// that something other than our own code has written to it.
     pub is_forged: bool,
     pub is_closed: bool,
 }
