@@ -188,7 +188,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "pulse",
-        description: "amplitude for `width` seconds from `start` on, otherwise no torque",
+        description: "constant torque for `width` seconds from `start` on, otherwise no torque",
         parameters: &[
             parameter("amplitude", 0.05, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
@@ -200,7 +200,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "bang-stop-bang",
-        description: "+amplitude for `bang` seconds from `start` on, none for `stop` seconds, -amplitude for `bang` seconds, then none: the hub is spun up, coasts and is brought to rest (thesis 2.7.1)",
+        description: "+amplitude for `bang` seconds from `start` on, no torque for `stop` seconds, then -amplitude for `bang` seconds: the hub is accelerated, coasts and is stopped (thesis 2.7.1)",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
@@ -220,7 +220,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "acceleration-step",
-        description: "inertia × acceleration for `width` seconds from `start` on, as of a wheel whose speed changes linearly (thesis 2.7.1)",
+        description: "constant torque `inertia` × `acceleration` for `width` seconds from `start` on, as by a reaction wheel whose speed changes linearly (thesis 2.7.1)",
         parameters: &[
             parameter("acceleration", 0.1, "rad/s²", "acceleration", Allowed::Any),
             // inertia of the hub with its liquid, hub.I + tank.m_liq tank.r², at the FMU's start values
@@ -237,7 +237,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "noise",
-        description: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
+        description: "band-limited noise with a power density proportional to f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
         parameters: &[
             parameter("rms", 0.05, "N·m", "torque, rms", Allowed::Positive),
             parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::NotNegative),
@@ -259,7 +259,7 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "sine-noise",
-        description: "A sin 2πft plus noise as of the profile `noise`, the sum clipped at ±limit: a steady wave, and noise that excites the other modes (thesis 8.6.1)",
+        description: "A sin 2πft plus the noise of the profile `noise`, the sum clipped at ±limit: a steady wave, with noise that excites the other modes (thesis 8.6.1)",
         parameters: &[
             parameter("amplitude", 0.1, "N·m", "torque amplitude of the sine", Allowed::Any),
             parameter("frequency", 2.4, "Hz", "frequency of the sine", Allowed::Within(FREQUENCY)),
@@ -292,5 +292,5 @@ pub const KINDS: &[Kind] = &[
 
 pub const FILE: (&str, &str) = (
     "file:path=FILE,hold=false",
-    "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, interpolated linearly, or held with hold=true; a relative path starts where the command is started",
+    "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, interpolated linearly, or held with hold=true; a relative path begins at the current directory",
 );

@@ -48,14 +48,14 @@ const ANGLE: Parameter = parameter(
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "gauge",
-        description: "wave height at the wall of HubSlosh's tank, m, at an angle from radially outwards towards tangential",
+        description: "wave height at the wall of HubSlosh's tank, m; angle is 0 radially outwards and 90deg in the tangential direction",
         parameters: &[ANGLE],
         unit: "m",
         of: None,
     },
     Kind {
         name: "pressure",
-        description: "pressure at the wall of HubSlosh's tank relative to the gas, Pa, at an angle and a height above the bottom",
+        description: "pressure at the wall of HubSlosh's tank above the pressure of the gas, Pa, at an angle as of a gauge and a height above the bottom",
         parameters: &[
             ANGLE,
             parameter("height", 0.0, "m", "height over the bottom", Allowed::NotNegative),
@@ -65,21 +65,21 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "camera",
-        description: "surface in HubSlosh's tank: best-fitting plane and amplitude of every mode, as heights at the wall, m",
+        description: "surface in HubSlosh's tank: the plane that fits it best and the amplitude of each mode, as heights at the wall, m",
         parameters: &[],
         unit: "m",
         of: None,
     },
     Kind {
         name: "force",
-        description: "force output of the FMU, named by of=NAME, N",
+        description: "output of the FMU that is a force, N; of=NAME names it",
         parameters: &[],
         unit: "N",
         of: Some(Some(F_TANGENTIAL)),
     },
     Kind {
         name: "accelerometer",
-        description: "specific force at a radius of HubSlosh's hub, on the tank's side, along an angle, m/s²",
+        description: "specific force of a point of HubSlosh's hub, m/s²; radius is its distance from the axis on the tank's side, and angle the measured direction",
         parameters: &[
             parameter("radius", 0.225, "m", "distance from the bearing axis", Allowed::Any),
             ANGLE,
@@ -89,14 +89,14 @@ pub const KINDS: &[Kind] = &[
     },
     Kind {
         name: "encoder",
-        description: "angle output of the FMU, named by of=NAME, rad",
+        description: "output of the FMU that is an angle, rad; of=NAME names it",
         parameters: &[],
         unit: "rad",
         of: Some(Some(THETA)),
     },
     Kind {
         name: "variable",
-        description: "Real variable of any FMU, named by of=NAME",
+        description: "any Real variable of any FMU; of=NAME names it",
         parameters: &[],
         unit: "",
         of: Some(None),
@@ -106,12 +106,24 @@ pub const KINDS: &[Kind] = &[
 const READING: &str = "its unit";
 
 pub const ERRORS: [Parameter; 7] = [
-    parameter("rate", 0.0, "Hz", "samples a second; 0: one a row", Allowed::NotNegative),
+    parameter(
+        "rate",
+        0.0,
+        "Hz",
+        "samples per second; 0: one sample in each row",
+        Allowed::NotNegative,
+    ),
     parameter("noise", 0.0, READING, "standard deviation of a sample", Allowed::NotNegative),
-    parameter("bias", 0.0, READING, "reading at 0", Allowed::Any),
-    parameter("scale", 1.0, "", "reading over quantity", Allowed::NotZero),
-    parameter("quantum", 0.0, READING, "step of the readings; 0: none", Allowed::NotNegative),
-    parameter("delay", 0.0, "s", "time until a sample is read", Allowed::NotNegative),
+    parameter("bias", 0.0, READING, "reading if the quantity is 0", Allowed::Any),
+    parameter("scale", 1.0, "", "reading divided by the quantity", Allowed::NotZero),
+    parameter(
+        "quantum",
+        0.0,
+        READING,
+        "smallest step of the readings; 0: none",
+        Allowed::NotNegative,
+    ),
+    parameter("delay", 0.0, "s", "time from a sample to its reading", Allowed::NotNegative),
     parameter("seed", 1.0, "", "seed of the noise", Allowed::Whole(9e15)),
 ];
 
@@ -410,8 +422,9 @@ pub fn help() -> String {
         let colon = if all.is_empty() { "" } else { ":" };
         format!("  {}{colon}{}\n      {}\n", kind.name, all.join(","), kind.description)
     });
-    let errors = format!("  every sensor also has: {}\n", written(&ERRORS));
-    kinds.chain([errors]).collect()
+    let head = "  every sensor also has:\n".to_string();
+    let error = |p: &Parameter| format!("      {}={}: {}\n", p.name, p.default, p.label);
+    kinds.chain([head]).chain(ERRORS.iter().map(error)).collect()
 }
 
 /// Returns a hash of a text that is the same on every machine (FNV-1a).
