@@ -9,7 +9,7 @@ pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 /// Minimum of a sum of squares.
 ///
 /// - `x`: values of the unknowns at the minimum.
-/// - `cost`: sum of squares there.
+/// - `cost`: sum of squares at `x`.
 /// - `converged`: false if the search reached its limit of iterations.
 /// - `reason`: reason for which the search ended.
 #[derive(Clone, Debug)]

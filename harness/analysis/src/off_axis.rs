@@ -57,12 +57,12 @@ impl OffAxis {
     }
 }
 
-/// Computes the off-axis part of the motion of a platform that may tilt. `rate` is the rate about
-/// the hub's axis, rad/s, and `response` its frequency response H to the torque; `others` has
-/// responses H_i and rates ω_i about other axes. As in Rubaga's thesis, the cross-axis energy
-/// fraction is Σω_i²/(Σω_i² + ω²), and the leakage is √(Σ|H_i|²)/|H|. Returns the leakage at each
-/// frequency of the response, and the measures of [`OffAxis`] with rates in place of forces. The
-/// measures are `None` if `others` is empty.
+/// Computes the off-axis part of the motion of a platform that may tilt. `rate` is the rate ω about
+/// the hub's axis, rad/s, and `response` its frequency response H to the torque. `others` has, for
+/// each other axis i, the response H_i and the rate ω_i. As in Rubaga's thesis, the cross-axis
+/// energy fraction is Σω_i²/(Σω_i² + ω²), and the leakage is √(Σ|H_i|²)/|H|. Returns the leakage at
+/// each frequency of the response, and the measures of [`OffAxis`] with rates in place of forces.
+/// The measures are `None` if `others` is empty.
 ///
 /// The mean of each rate is subtracted. Otherwise the bias of a gyro would count as energy: a bias
 /// of 1 deg/s about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`]

@@ -174,8 +174,8 @@ pub struct Toolchain {
     root: PathBuf,
     path: OsString,
     sysroot: PathBuf,
-    /// Path of the source of the standard library, from which it is compiled for targets whose
-    /// compiled library is not installed.
+    /// Path of the source of Rust's standard library. For targets whose compiled library is not
+    /// installed, the library is compiled from this source.
     source: Option<PathBuf>,
     home: String,
 }

@@ -39,9 +39,9 @@ pub fn needs_source(what: &str) -> Result<()> {
 
 const PROFILE: &str = "fmu";
 
-/// Builds the library (cdylib) of the crate `package` of this workspace, with the profile of FMUs,
-/// for the platform on which this program runs, and returns its path. `quiet` suppresses Cargo's
-/// progress.
+/// Builds the library (cdylib) of the crate `package` of this workspace for the platform on which
+/// this program runs, with the Cargo profile for FMUs. Returns the path of the library. `quiet`
+/// suppresses Cargo's progress.
 ///
 /// # Errors
 ///

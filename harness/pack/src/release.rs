@@ -12,12 +12,12 @@ use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
 
-/// Name of the list of the files in the folder of the release with their SHA-256, in the format of
-/// `sha256sum --check`.
+/// Name of the list of the files that the release folder contains, with their SHA-256, in the
+/// format of `sha256sum --check`.
 pub const PRESENT: &str = "SHA256SUMS";
 
-/// Name of the list of all files of all releases with their SHA-256: the files in [`PRESENT`],
-/// files of older versions, and wheels that are published, but not kept in the folder.
+/// Name of the list of files of all releases, with their SHA-256. It contains the files in
+/// [`PRESENT`], files of older versions, and wheels that are published, but not kept in the folder.
 pub const MANIFEST: &str = "SHA256SUMS.all";
 
 /// Largest wheel for Linux that is kept in the folder of the release, bytes. The size is limited

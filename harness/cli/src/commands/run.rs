@@ -94,7 +94,7 @@ pub struct RunArgs {
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
-    /// File for the signals, .csv or .parquet; - prints them as CSV.
+    /// File for the signals, .csv or .parquet. The value `-` prints the signals as CSV.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }

@@ -35,7 +35,7 @@ pub struct TorqueArgs {
     /// Time of the last row, s [default: the end of the profile].
     #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
-    /// File for the torque, .csv or .parquet; - prints it as CSV.
+    /// File for the torque, .csv or .parquet. The value `-` prints the torque as CSV.
     #[arg(long, value_name = "FILE", required_unless_present = "profiles")]
     out: Option<PathBuf>,
     /// Lists the profiles as a Markdown table and writes nothing.
