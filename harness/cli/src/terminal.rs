@@ -26,7 +26,14 @@ pub struct Terminal {
     #[arg(long, global = true, help_heading = GLOBAL)]
     strict: bool,
     /// Decides when messages have colours.
-    #[arg(long, global = true, help_heading = GLOBAL, value_name = "WHEN", default_value = "auto", value_parser = color_parser())]
+    #[arg(
+        long,
+        global = true,
+        help_heading = GLOBAL,
+        value_name = "WHEN",
+        default_value = "auto",
+        value_parser = color_parser()
+    )]
     color: ColorChoice,
     /// Internal: prints progress and results as JSON text sequences (RFC 7464), for the Python package.
     #[arg(long, global = true, hide = true)]
