@@ -118,8 +118,8 @@ pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// The expected values, with six digits, are those of the tank in `fmu/craft/tests/six.json`, which has a radius of 0.45
-    /// m and is filled 0.6 m deep with a liquid of 1000 kg/m3.
+    /// The expected values, with six digits, belong to the tank in `fmu/craft/tests/six.json`, which has a radius of 0.45 m
+    /// and is filled 0.6 m deep with a liquid of 1000 kg/m3.
     #[test]
     fn the_pendulum_of_a_cylinder_equals_the_reference_values() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
@@ -207,8 +207,8 @@ mod tests {
     }
 
     /// A film of liquid that is much thinner than wide has the inertia per mass of a disk, R^2/4, and a long column tends to
-    /// h^2/12 - 3 R^2/4. For the film the result is too small by 2/(3 pi x^3) with x = 400 pi + 0.8 and R = 1, because the function
-    /// sums 400 terms and uses the value of tanh at x in all later terms.
+    /// h^2/12 - 3 R^2/4. The result for the film is too small by 1.07e-10 R^2, because the function sums only 400 terms
+    /// exactly and uses a single value of tanh in all later terms.
     #[test]
     fn the_inertia_of_a_capped_cylinder_has_the_limits_of_a_disk_and_of_a_long_column() {
         let film = capped_inertia(2.0, 1e-12);
@@ -223,7 +223,8 @@ mod tests {
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
 
-    /// At the tenth zero, the last one of the table, the expansion has an error of 1e-8, the size of its first omitted term.
+    /// At the tenth zero, the last one of the table, McMahon's expansion has an error of 1e-8, the size of its first omitted
+    /// term.
     #[test]
     fn mcmahon_s_expansion_continues_the_table_of_zeros() {
         let tenth = mcmahon(10);

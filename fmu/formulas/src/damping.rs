@@ -197,18 +197,19 @@ pub struct Estimate {
     pub interval_of_others: [f64; 2],
 }
 
-/// Estimates the damping of a tank as a multiple of the damping of the laminar layer at its wall. `parts` are the measured
-/// shapes of which the wetted wall consists; the rest of the wall counts as [`UNMEASURED`]. `near` are the measured shapes
-/// that the tank resembles, for example the sphere for a spheroid that is almost round.
+/// Estimates the damping ratios of a tank, each divided by the damping ratio of the laminar layer at the wall. `parts` are
+/// the parts of the wetted wall that have a shape with measured damping; the rest of the wall has the factor [`UNMEASURED`].
+/// `near` are measured shapes that the whole wall only resembles, for example the sphere for a spheroid that is almost
+/// round.
 ///
-/// The result is the mean over the wall, in which each shape has its factor in proportion to its share of the wetted area.
-/// The factor is moved towards [`UNMEASURED`] if the correlation has less than its full weight or gives less damping than the
-/// laminar layer.
+/// The estimate is the mean of the factors of all parts, weighted with their shares of the wetted area. The factor of a part
+/// is moved towards [`UNMEASURED`] if the correlation of its shape has less than its full weight, or gives less damping than
+/// the laminar layer.
 ///
-/// If the whole wall is one shape whose correlation agrees with [`UNMEASURED`], the interval of the first mode is the scatter
-/// of measured tanks. Otherwise it extends from the laminar layer to 1.3 times the largest factor of all parts and near
-/// shapes. While the share of the shape falls from 100 % to 95 %, the interval changes continuously from the first rule to
-/// the second.
+/// If the whole wall is one shape whose correlation agrees with [`UNMEASURED`], the interval of the first mode is the
+/// scatter of measured tanks, ±30 %. Otherwise it extends from the laminar layer to 1.3 times the largest factor of all
+/// `parts` and of all shapes in `near`. If such a shape covers 95 to 100 % of the wall, the interval is interpolated between
+/// these two rules, so that it changes continuously.
 pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
     let mean = |sum: f64, part: &Part| sum + part.share * (part.shape_factor() - UNMEASURED);
     let factor = match parts {

@@ -88,26 +88,26 @@ pub const FREQUENCY: f64 = 3e-3;
 /// %. It applies if the response is wrong only because frequency and amplitude are related differently in model and liquid.
 pub const FORCED: f64 = 8.5e-4;
 
-/// Relative error of the third-order model's frequency at which its response to forcing counts as wrong by 3 %, in tanks in
-/// which only free motion was compared with potential flow. The value is the smallest frequency error at which the forced
-/// response of an upright cylinder with h/R of 0.4 or more was wrong by 3 %.
+/// Relative error of the third-order model's frequency from which on its response to forcing counts as wrong by 3 %. It is
+/// used for tanks in which only free motion was compared with potential flow. The value is the smallest frequency error at
+/// which the forced response of an upright cylinder with h/R of 0.4 or more was wrong by 3 %.
 pub const FORCED_UNCOMPARED: f64 = 1.7e-4;
-/// Ratio by which a model with [`energy_terms`] may have larger slosh angles than the third-order model before the error of a
-/// forced response reaches 3 %. It is used for tanks in which only free motion was compared with potential flow. The value is
-/// the smallest that was found in upright cylinders.
+/// Ratio by which a slosh mass with the coefficients of [`energy_terms`] may have larger slosh angles than the third-order
+/// model before the error of a forced response reaches 3 %. It is used for tanks in which only free motion was compared with
+/// potential flow. The value is the smallest that was found in upright cylinders.
 pub const ENERGY_UNCOMPARED: f64 = 1.06;
 /// Largest slosh angle, rad, at which the third-order model had a forced response with an error below 3 % in any upright
 /// cylinder.
 pub const LARGEST_FORCED: f64 = 9.3 * PI / 180.0;
-/// Largest slosh angle, rad, at which a model with [`energy_terms`] had a forced response with an error below 3 % in any
-/// upright cylinder.
+/// Largest slosh angle, rad, at which a slosh mass with the coefficients of [`energy_terms`] had a forced response with an
+/// error below 3 % in any upright cylinder.
 pub const LARGEST_FORCED_ENERGY: f64 = 10.2 * (PI / 180.0);
 
 /// Limits of the third-order model for planar motion in an upright cylinder. Each row contains h/R and two slosh angles,
 /// degrees: the angle at which the natural frequency has the error [`FREQUENCY`], and the angle at which the error of a
-/// forced response is 3 %. (In rotary motion the frequency reaches this error at larger angles, except where the branch
-/// folds.) In the range [`third_order::BRIDGED`] the coefficients are interpolated. `harness/tank/tests/tank/backbones.rs`
-/// computes the first angle from `harness/tank/tests/backbones.csv`.
+/// forced response is 3 %. (In rotary motion the frequency reaches this error at larger angles, except where the branch of
+/// rotary motion folds.) In the range [`third_order::BRIDGED`] the coefficients are interpolated.
+/// `harness/tank/tests/tank/backbones.rs` computes the first angle from `harness/tank/tests/backbones.csv`.
 const THIRD_ORDER: [[f64; 3]; 12] = [
     [0.25, 4.41, 1.3],
     [0.3, 7.11, 2.4],
@@ -149,9 +149,9 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     AngleLimit { frequency: own(FREQUENCY, 1), forced: own(FORCED, 2) }
 }
 
-/// Limits of the model with [`energy_terms`] in planar motion. Each row contains h/R and the slosh angle, degrees, at which
-/// the error of a forced response is 3 %. From h/R = 0.6 on the error stays below 3 % up to 15 degrees, the largest angle
-/// that was compared.
+/// Limits of a slosh mass with the coefficients of [`energy_terms`] in planar motion. Each row contains h/R and the slosh
+/// angle, degrees, at which the error of a forced response is 3 %. From h/R = 0.6 on the error stays below 3 % up to 15
+/// degrees, the largest angle that was compared.
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 
@@ -160,15 +160,15 @@ const FORCED_ENERGY: [[f64; 2]; 7] =
 const ROTARY: [[f64; 2]; 6] =
     [[0.65, 9.3], [0.8, 7.7], [1.0, 4.8], [1.227, 5.9], [2.0, 7.2], [2.5, 7.2]];
 
-/// Limits of the model with [`energy_terms`] in rotary motion. Each row contains h/R and the slosh angle, degrees, at which
-/// the error of a forced response is 3 %.
+/// Limits of a slosh mass with the coefficients of [`energy_terms`] in rotary motion. Each row contains h/R and the slosh
+/// angle, degrees, at which the error of a forced response is 3 %.
 const ROTARY_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.8], [0.35, 4.0], [0.4, 5.0], [0.5, 7.5], [0.6, 9.6], [0.7, 10.2]];
 
 /// Returns the largest valid slosh angle, rad, of rotary motion in an upright cylinder filled to h/R = `fill`. At this angle
-/// the error of a forced response is 3 %, or the branch of rotary motion folds. `has_energy` is true for the model with
-/// [`energy_terms`] and false for the third-order model. The result is `None` in shallow liquid, where planar motion has the
-/// smaller limit.
+/// the error of a forced response is 3 %, or the branch of rotary motion folds. `has_energy` is true for a slosh mass with
+/// the coefficients of [`energy_terms`], and false for a slosh mass of third order. The result is `None` in shallow liquid,
+/// where planar motion has the smaller limit.
 pub fn swirl(fill: f64, has_energy: bool) -> Option<f64> {
     let forced = match has_energy && energy_terms(fill).is_some() {
         true => Some(interpolate(fill, ROTARY_ENERGY)),
@@ -177,8 +177,8 @@ pub fn swirl(fill: f64, has_energy: bool) -> Option<f64> {
     [forced.map(f64::to_radians), swirl_fold(fill)].into_iter().flatten().reduce(f64::min)
 }
 
-/// Returns the largest valid slosh angles of a model with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`;
-/// `None` at depths without these coefficients.
+/// Returns the largest valid slosh angles of a slosh mass with the coefficients of [`energy_terms`] in an upright cylinder
+/// filled to h/R = `fill`; `None` at depths for which these coefficients are not known.
 pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
     let compared = energy_terms(fill)?.compared;
     Some(AngleLimit { frequency: compared, forced: interpolate(fill, FORCED_ENERGY).to_radians() })
@@ -196,9 +196,9 @@ pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 
-/// Returns a slosh angle of the table [`THIRD_ORDER`], rad, interpolated at h/R = `fill`: the limit of the natural frequency
-/// if `column` is 1, and the limit of forced responses if it is 2. In liquid shallower than the first row, the power law
-/// through the first two rows is continued; in liquid deeper than the last row, the last value is used.
+/// Interpolates the table [`THIRD_ORDER`] at h/R = `fill`. Returns the slosh angle, rad, at which the error of the natural
+/// frequency (`column` = 1) or of a forced response (`column` = 2) reaches its limit. In liquid shallower than the first
+/// row, the power law through the first two rows is continued; in liquid deeper than the last row, the last value is used.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {
@@ -226,10 +226,10 @@ fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
 /// the spin rate, and R the radius of the free surface.
 pub const SPIN_NUMBER: f64 = 0.3;
 
-/// Limits of the spin rate Omega of a tank, up to which a pendulum represents its liquid. `factor` is 4 (1 + C_0) with the
-/// gyroscopic coefficient C_0 of the first mode. If it exceeds omega_0^2/Omega^2, where omega_0 is the natural frequency
-/// without spin, one of the mode's two waves has become an inertial wave, which no pendulum represents. `ratio` is the
-/// radius of the free surface divided by the pendulum length.
+/// Limits up to which a pendulum represents the liquid of a tank that spins at the rate Omega. `factor` is 4 (1 + C_0) with
+/// the gyroscopic coefficient C_0 of the first mode. If this factor exceeds omega_0^2/Omega^2, where omega_0 is the natural
+/// frequency without spin, one of the mode's two waves has become an inertial wave, which no pendulum represents. `ratio` is
+/// the radius of the free surface divided by the pendulum length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinLimit {
     factor: f64,

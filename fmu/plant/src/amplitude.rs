@@ -140,8 +140,8 @@ impl Growth {
     }
 
     /// Estimates the time, s, over which the series of the drag converge, from their first three coefficients. The drag is
-    /// singular where the amplitude is 0 (u = 0), where there is no restoring force (W = 0), and near the onset of breaking
-    /// (y = +-i delta W^(1/2)). These symbols are defined at the head of the file.
+    /// singular where u = W (|q|^2 + A_0^2) + |q'|^2 is 0, with the squared natural frequency W, the slosh angle q and the
+    /// small constant A_0. If waves break, it is also singular where W is 0, and close to the onset of breaking.
     pub fn convergence_radius(&self) -> f64 {
         let time_near = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
         let time = time_near(self.u[0], &self.u);

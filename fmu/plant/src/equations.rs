@@ -201,7 +201,7 @@ impl Plant {
             || self.present_ranges(inputs) != self.state.ranges
     }
 
-    /// Returns the number of contact changes since the start, the time of the last one, s, and the number of the present
+    /// Returns the number of contact changes since the start, the time of the last change, s, and the number of the present
     /// [`Contact`].
     pub fn last_contact(&self) -> (i32, f64, i32) {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)

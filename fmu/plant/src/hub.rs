@@ -38,8 +38,9 @@ pub struct Tilt {
 impl Tilt {
     const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
 
-    /// Computes Taylor coefficient n of `direction` and `e` from the hub's angle `theta`, which must be known up to order n,
-    /// and from the specific force `g` with its rate.
+    /// Computes Taylor coefficient n of gravity's component across the axis, `e`, m/s2, and of `direction`, which is `e`
+    /// divided by the specific force along the axis. The specific force is `g`, with its rate. The angle of the hub,
+    /// `theta`, must be known up to order n.
     pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
         if self.tangent == 0.0 {
             return;

@@ -104,9 +104,9 @@ impl Imu {
         gyro.next += 1;
     }
 
-    /// Advances the processes `all` of the flicker noise by one sample, which has the number `k`. `keep` returns the
-    /// fraction of a process that remains after one sampling period, from the correlation time of this process, s; random
-    /// numbers add the rest.
+    /// Advances the processes `all`, whose sum is the flicker noise, by one sample, which has the number `k`. `keep`
+    /// receives the correlation time of a process, s, and returns the factor by which its value decays in one sampling
+    /// period. A new random number then restores the variance of the process.
     fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;

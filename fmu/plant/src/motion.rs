@@ -590,8 +590,8 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 }
 
-/// Returns the larger of two magnitudes. If one of them is NaN, the result may be the other one, because other checks end a
-/// step with NaN.
+/// Returns the larger of two magnitudes. If one of them is NaN, the function may return the other one. This is harmless,
+/// because other checks end a step with NaN.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }

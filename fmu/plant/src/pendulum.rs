@@ -228,8 +228,8 @@ impl Pendulum {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
     }
 
-    /// Returns Taylor coefficient n of drag coefficient times the rate `v`. The drag coefficient is divided by its value at
-    /// the start of the series; if `varies` is false, it is constant.
+    /// Returns Taylor coefficient n of the product of the drag coefficient and the rate `v`. The drag coefficient is divided
+    /// by its value at the start of the series; if `varies` is false, this ratio is always 1.
     #[inline(always)]
     pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
         if varies { mul(n, &self.course, v) } else { v[n] }

@@ -75,10 +75,10 @@ impl SloshModel {
         }
     }
 
-    /// Returns how the obliqueness of a pendulum on a tilted bench changes its squared frequency, by the factor `stiffness`,
-    /// and its slosh mass, by the factor `share` (F and M in `leaning.rs`). `slope` is the tangent of the tilt angle, and
-    /// `n2` the squared tangential component of the unit vector along gravity's component across the axis. `s` and `kappa`
-    /// are the large-wave coefficients of the pendulum.
+    /// Compares the oblique pendulum that represents a mode on a tilted bench with an upright pendulum. Returns the factors
+    /// (F and M at the head of `leaning.rs`) by which its squared frequency (`stiffness`) and its slosh mass (`share`)
+    /// differ. `slope` is the tangent of the tilt angle, and `n2` the squared tangential component of the unit vector along
+    /// gravity's component across the axis. `s` and `kappa` are the large-wave coefficients of the pendulum.
     pub(crate) fn oblique(self, slope: f64, n2: f64, (s, kappa): (f64, f64)) -> Oblique {
         let s2 = slope * slope;
         match self {

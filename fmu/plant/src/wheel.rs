@@ -229,8 +229,9 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// The expected time t is the solution of a t + b t^2/2 = I_w (W_0 - W), where the left side is the impulse of the torque
-    /// a + b t, and the right side the change of the rotor's angular momentum.
+    /// The expected time t is the solution of a t + b t^2/2 = I_w (W_0 - W), that is, the impulse of the torque a + b t
+    /// equals the change of the rotor's angular momentum. I_w is the inertia of the rotor, W_0 its speed at the start, and W
+    /// its speed limit.
     #[test]
     fn the_rotor_reaches_its_speed_limit_at_the_time_that_the_impulse_of_the_torque_gives() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };

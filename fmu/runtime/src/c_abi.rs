@@ -48,7 +48,6 @@ pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 pub struct Log {
     logger: Option<Logger>,
     pub filter: Filter,
-    /// True after the warning about the host's communication steps was logged, so that it is logged only once.
     step_warned: bool,
 }
 
@@ -373,7 +372,8 @@ pub unsafe fn fill<M: Model, V: Version>(
 }
 
 /// Handles the host's message that its integrator has completed a step. Sets the host's variable `enter_event_mode` to true
-/// if an event must be handled now, and otherwise to false. `B` is the Boolean type of the FMI version.
+/// if an event must be handled now, and otherwise to false. The host's variable `terminate` is always set to false, because
+/// the FMU never ends the simulation. `B` is the Boolean type of the FMI version.
 pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
     handle: *mut c_void,
     enter_event_mode: *mut B,

@@ -110,7 +110,7 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     }
 
     /// Applies the discrete changes that the present inputs cause, for example the start of sticking, and keeps them.
-    /// [`Dynamics::apply_present_inputs`] does the same for a short time.
+    /// [`Dynamics::apply_present_inputs`] makes the same changes, which the runtime then undoes.
     fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
         let _ = inputs;
     }

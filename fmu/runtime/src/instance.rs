@@ -62,7 +62,7 @@ pub struct Instance<M: Model, V: Version> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     Nothing,
-    /// The stored outputs are valid if they are integers, enumerations or Booleans, but not if they are real.
+    /// Only those stored outputs are valid that are integers, enumerations or Booleans; real outputs are not.
     Discrete,
     All,
 }
@@ -1412,7 +1412,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns the outputs, of which at least integers, enumerations and Booleans are valid at the present instant.
+    /// Returns the outputs. Integers, enumerations and Booleans among them are valid at the present instant; real outputs
+    /// may belong to an earlier instant.
     fn discrete_outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
         let Instance { events, model, inputs, outputs, known, .. } = self;
         if *known == Known::Nothing

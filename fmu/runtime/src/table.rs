@@ -292,7 +292,7 @@ impl<M: Dynamics> Table<M> {
         self.variables.iter().any(|v| v.shape.iter().any(sizes))
     }
 
-    /// Returns the discrete outputs in the order of the table, which is also the order of their slots.
+    /// Returns the discrete outputs in the order of the table, which is also the order of [`Scalar::slot`].
     pub fn discrete(&self) -> impl Iterator<Item = &'static Scalar<M>> + use<M> {
         self.scalars.iter().filter(|scalar| is_discrete(scalar.variable))
     }

@@ -185,8 +185,8 @@ pub struct Variable<M: Dynamics> {
     /// Inputs and continuous states on which the variable depends without delay. The name of an array stands for all its
     /// elements; the name with "[]" stands for the element with the same index as the element of this variable.
     pub depends_on: &'static [&'static str],
-    /// Further parameters and inputs on which the initial value of the variable depends. A name that ends with a dot stands
-    /// for all parameters whose names begin with it.
+    /// Parameters and inputs on which the initial value of the variable depends in addition to `depends_on`. A name that
+    /// ends with a dot stands for all parameters whose names begin with it.
     pub initial_depends_on: &'static [&'static str],
 }
 

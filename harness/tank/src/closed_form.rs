@@ -16,10 +16,11 @@ const TERMS: usize = 400;
 const ERROR: f64 = 1e-11;
 
 /// Returns the remainder of the series sum tanh(k h/2)/k^5 after the wave number `last`. The
-/// remaining wave numbers k are `step` apart, and `h` is the depth. The sum is replaced by the
-/// integral (1/step) int dk (midpoint rule in reverse), with u = 1/k. The terms fall as k^-5 for
-/// large k h and as k^-4 for small k h. In shallow liquid the terms after the first 400 add 4e-10 m
-/// R^2 to the effective inertia, with the mass m of the liquid and the radius R.
+/// remaining wave numbers k are `step` apart, and `h` is the depth. The remaining sum is replaced
+/// by the integral of its terms over k, divided by `step`, which is the midpoint rule in reverse.
+/// The terms fall as k^-5 for large k h and as k^-4 for small k h. In shallow liquid the terms
+/// after the first 400 add 4e-10 m R^2 to the effective inertia, with the mass m of the liquid and
+/// the radius R.
 fn series_remainder(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
@@ -84,8 +85,8 @@ fn sample_surface([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f
     }
 }
 
-/// Ratios of hyperbolic functions such as sinh(x)/cosh(y) for 0 <= x <= 2 y. All are divided by
-/// cosh(kh)^2, so that nothing overflows in deep liquid.
+/// Hyperbolic functions of k h, with the wave number k of a mode and the depth h, in forms that do
+/// not overflow in deep liquid. For example, `floor` is 1/cosh(k h)^2.
 struct Hyperbolic {
     floor: f64,
     half_tanh: f64,

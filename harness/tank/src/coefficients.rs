@@ -62,9 +62,10 @@ pub struct Coefficients {
     pub energy: Option<Energy>,
 }
 
-/// Coefficients of a mode that also give the energy of the wave (`formulas::energy_terms`), and are
-/// then used instead of the third-order coefficients. The first six fields, which have the names of
-/// the FMUs' parameters, are the coefficients s, kappa, s_2, kappa_2, t and t_2 of that module.
+/// Coefficients of a mode that give both the frequency and the energy of large waves
+/// (`formulas::energy_terms`). If they are known, they are used instead of the third-order
+/// coefficients. The first six fields, which have the names of the FMUs' parameters, are the
+/// coefficients s, kappa, s_2, kappa_2, t and t_2 of that module.
 ///
 /// - `angle_limit`: slosh angle above which the mode is out of range, rad.
 /// - `swirl_limit`: slosh angle above which rotary motion is out of range, rad, if this angle is

@@ -566,8 +566,8 @@ pub(crate) fn golden(
     [a, b]
 }
 
-/// Returns the lowest value of `sign` z on a segment, so that `sign` = -1 gives the highest point,
-/// and the fraction of the segment's parameter at which it lies.
+/// Returns the lowest point of a segment if `sign` is 1, and the highest point if `sign` is -1: the
+/// fraction of the segment's parameter at which it lies, and `sign` times its height, m.
 fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
     let height = |s: f64| sign * segment.point_at(s.clamp(0.0, 1.0))[1];

@@ -282,9 +282,9 @@ struct Shape {
     double: Option<[Wave; 3]>,
 }
 
-/// First-order motion as functions of azimuth and phase: its elevation, its potential, the
-/// derivative of the potential with respect to the azimuth, and the second-order parts that the
-/// motion causes.
+/// A planar or circular motion of the first mode. `first` contains three functions of azimuth and
+/// phase: the elevation, the potential, and the derivative of the potential with respect to the
+/// azimuth. `second` are the second-order parts that this motion causes.
 struct Motion {
     first: [Wave; 3],
     second: Vec<Shape>,

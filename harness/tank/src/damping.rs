@@ -15,9 +15,9 @@ use crate::tank::{Geometry, Shape, Tank};
 const ENDS: &str = "use the low end for stability margins, check both ends for settling times";
 
 /// Computes the damping of the modes `data` of a tank. The liquid has the kinematic viscosity `nu`,
-/// m²/s, at the specific force `gravity`, m/s². `springs` are the centring stiffnesses of the
-/// modes, N/m, for each axis of a box; they are empty without surface tension. The surface tension
-/// `sigma`, N/m, if known, widens the interval at low Bond numbers.
+/// m²/s, at the specific force `gravity`, m/s². `springs` are the stiffnesses that surface tension
+/// adds to the modes, N/m, for each axis of a box; they are empty without surface tension. The
+/// surface tension `sigma`, N/m, if known, widens the interval at low Bond numbers.
 ///
 /// If the wetted wall is a sphere, an upright cylinder, a cone or a torus to 1e-6 of its size, the
 /// correlation that was measured for this shape gives the damping. If only a part of the wall has
@@ -26,7 +26,8 @@ const ENDS: &str = "use the low end for stability margins, check both ends for s
 /// the shape of the tank.
 ///
 /// # Errors
-/// If there is neither gravity nor centring stiffness, because there is no natural frequency then.
+/// If neither gravity nor surface tension restores the liquid, because there is no natural
+/// frequency then.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,

@@ -38,25 +38,26 @@ const DEGREES: [usize; 2] = [18, 24];
 /// exchange energy. Coefficients for motion in one direction are then not valid.
 const NEARLY_SQUARE: f64 = 0.1;
 /// Largest value of tanh(k h) from which the depth h of a ring of liquid is computed, because tanh
-/// is too flat for larger values. A deeper ring gets the depth of this value.
+/// is too flat for larger values. If tanh(k h) is larger, the depth at which it has this value is
+/// used.
 const DEEP: f64 = 0.999;
 /// Largest slosh angle at which the third order counts as valid, rad. For example, at 26 degrees
 /// the frequency of the circular wave in a cylinder with h/R = 0.613 differs by 4 % from fully
 /// nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
 /// Estimated angle limit of a mode, divided by the slosh angle at which the second-order wave is
-/// [`STEEPEST`] of the first-order wave, for tanks that nobody has compared with fully nonlinear
-/// flow. It is the smallest ratio in upright cylinders and in a sphere filled to h/R = 1.5, where
-/// the error of a forced response reaches 3 % at 2.6 degrees.
+/// half of the first-order wave ([`STEEPEST`]), for tanks that nobody has compared with fully
+/// nonlinear flow. It is the smallest ratio in upright cylinders and in a sphere filled to h/R =
+/// 1.5, where the error of a forced response reaches 3 % at 2.6 degrees.
 const ESTIMATED_SHARE: f64 = 0.12;
 /// Largest second-order wave at the wall, relative to the first-order wave, at which the third
 /// order counts as valid.
 const STEEPEST: f64 = 0.5;
 
 const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
-/// Largest accepted difference between the shift of omega^2 per squared slosh angle that the
-/// smallest computed waves have, and the shift that third-order theory predicts. At 10 degrees this
-/// difference changes the frequency by 0.03 %.
+/// Largest accepted difference between two shifts of omega^2 per squared slosh angle: the shift
+/// that the smallest computed waves have, and the shift that third-order theory predicts. At a
+/// slosh angle of 10 degrees this difference changes the frequency by 0.03 %.
 const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
 const ASSUMED: &str = "without them the FMUs model a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
@@ -177,10 +178,9 @@ impl Coefficients {
         }
     }
 
-    /// Returns the slosh angle above which a pendulum is out of range in place of these
-    /// coefficients, rad. The range ends where the pendulum's shift of omega^2 differs too much
-    /// from the shift by these coefficients; the error of s and kappa counts as part of the
-    /// difference.
+    /// Returns the slosh angle, rad, above which a pendulum must not replace a slosh mass with
+    /// these coefficients. At this angle the pendulum's shift of omega^2 differs too much from the
+    /// shift by these coefficients; the error of s and kappa counts as part of the difference.
     fn pendulum_limit(&self) -> f64 {
         let [s, kappa] = [self.nonlinear_inertia, self.nonlinear_stiffness]
             .map(|x| self.error * (1.0 + x.abs()));
@@ -461,10 +461,11 @@ fn cylinder_coefficients(
 }
 
 impl Coefficients {
-    /// Checks if another mode has nearly twice the frequency of the first mode. If `excited` is
-    /// such a mode, its contribution is added to the error, and the result is `Err` if the
-    /// contribution is too large. `detuned` returns s and kappa for a relative change of the
-    /// second-order frequency.
+    /// Takes account of `excited`, a mode with nearly twice the frequency of the first mode, if
+    /// there is one: the error of the coefficients becomes at least the contribution of this mode,
+    /// and the result is `Err` if the contribution is too large. `detuned` returns s and kappa for
+    /// a second-order response at 2 omega (1 + its argument), with the frequency omega of the first
+    /// mode.
     fn judge_near_resonance(
         mut self,
         excited: Option<[usize; 2]>,

@@ -391,8 +391,9 @@ impl<'a> Solver<'a> {
         [value, rate]
     }
 
-    /// Returns the number of coefficients of the potential of a term. Axially symmetric terms (m =
-    /// 0) have one more, a constant, which keeps the volume.
+    /// Returns the number of coefficients in the potential of `term`. An axially symmetric term (m
+    /// = 0) has one coefficient more: the coefficient of a constant, which keeps the volume of the
+    /// liquid.
     fn potentials_of(&self, term: Term) -> usize {
         match term.has_potential() {
             true => self.combinations[term.m].ncols() + usize::from(term.m == 0),
@@ -405,11 +406,12 @@ impl<'a> Solver<'a> {
         [self.resolution.polynomials * self.terms.len(), potentials]
     }
 
-    /// Computes the base functions of the potential at the heights `z` above the `points`. `walls`
-    /// has radius, slope and curvature of the wall at these heights. If the coefficients `c` are
-    /// given, the derivatives of the sum of the base functions are computed, too: zz, rz and rr,
-    /// and the derivatives with respect to theta of the sum, of its z-derivative and of its
-    /// r-derivative.
+    /// Computes the base functions of the potential at the heights `z` above the `points`. Each
+    /// element of `walls` contains the radius, slope and curvature of the wall at such a height.
+    /// `c` are the coefficients of the base functions; if they are given, derivatives of the sum of
+    /// the base functions are computed, too: the second derivatives with respect to z z, r z and r
+    /// r, the first derivative with respect to theta, and the second derivatives with respect to z
+    /// theta and r theta.
     fn potentials(
         &self,
         points: &Points,
@@ -707,8 +709,8 @@ const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
 const ORDER: usize = 4;
 /// Slosh angles at which waves are computed, degrees.
 const ANGLES: [f64; 9] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
-/// Largest accepted relative scatter of the frequencies at one slosh angle, measured by the median
-/// absolute deviation between the [`DEGREES`].
+/// Largest accepted relative scatter of the frequencies that the computations with the different
+/// [`DEGREES`] give at one slosh angle, measured by the median absolute deviation.
 const SCATTER: f64 = 2e-4;
 
 fn median(values: &mut [f64]) -> f64 {
@@ -721,8 +723,9 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// Returns periodic waves of the liquid above `wall` with rising slosh angle. Each wave is the
-/// median over [`DEGREES`]. The list ends at the slosh angle at which their frequencies scatter by
-/// more than [`SCATTER`]; it is empty for a liquid with a hole.
+/// median of the results with the degrees [`DEGREES`] of the solid harmonics. The list ends at the
+/// slosh angle at which the frequencies of these results scatter by more than [`SCATTER`]; it is
+/// empty for a liquid with a hole.
 fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     let angles = ANGLES.map(f64::to_radians);
     let truncation = &|degree: usize| {
@@ -766,8 +769,8 @@ fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     waves
 }
 
-/// Largest relative distance from the straight line through the other waves at which a wave is not
-/// an outlier: for the frequency, and for the rise of the centre of mass.
+/// Relative distance from the straight line through the other waves beyond which a wave counts as
+/// an outlier: for its frequency, and for the rise of its centre of mass.
 const OUTLIER: [f64; 2] = [5e-4, 3e-3];
 
 /// Removes waves whose frequency or rise lies off the straight line through the other waves,
@@ -863,7 +866,8 @@ fn circular_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
 /// Returns the limits of a third-order slosh mass with the coefficients `pair` = (s, kappa), in a
 /// tank whose large waves have the coefficients `terms`. Above the returned slosh angles the
 /// frequency of the third-order mass, in planar or in circular motion, differs too much from the
-/// frequency of the large waves. They are at most the angle up to which `terms` hold.
+/// frequency of the large waves. The returned angles never exceed the angle up to which `terms` are
+/// valid.
 pub(crate) fn third_order_limit(terms: &EnergyTerms, pair: [f64; 2]) -> AngleLimit {
     let third = EnergyTerms { pair, next: [0.0; 2], rotary: [0.0; 2], ..*terms };
     let off = |angle: f64| {
@@ -1088,8 +1092,9 @@ mod tests {
         }
     }
 
-    /// The frequencies, each the median over [`DEGREES`], are compared with one finer expansion,
-    /// whose largest multiple of the frequency is 5 instead of [`ORDER`].
+    /// The frequencies, each the median of the results with the degrees [`DEGREES`] of the solid
+    /// harmonics, are compared with the result of one finer expansion, in which the largest
+    /// multiple of the frequency is 5 instead of [`ORDER`].
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn large_waves_in_a_sphere_do_not_depend_on_the_resolution() {

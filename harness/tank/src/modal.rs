@@ -403,7 +403,8 @@ impl ModalData {
 
     /// Sets the numerical errors of all results. The error of the fixed mass's inertia, which is
     /// I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2, follows by error propagation: its
-    /// derivatives with respect to I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
+    /// derivatives with respect to I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2. Here h_n and
+    /// h_0 are the heights of slosh mass n and of the fixed mass above the liquid's centre of mass.
     pub(crate) fn set_error(&mut self, error: f64, error_beta: f64) {
         (self.error, self.error_beta) = (error, error_beta);
         let axes = self.axes.iter().flat_map(|axes| axes.x.rest.iter().chain(&axes.y.rest));
@@ -470,8 +471,8 @@ struct Approximation {
 
 /// Returns the numbers of Gauss points per panel of four discretisations, whose results are
 /// compared to estimate the error. The first discretisation serves only for this estimate, and the
-/// last is solved only if the first three are not accurate enough. Many `panels` get fewer points,
-/// so that the matrices stay small.
+/// last is solved only if the first three are not accurate enough. If there are many `panels`, each
+/// has fewer points, so that the matrices stay small.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -773,8 +774,9 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// The true error must be below half of the stated error. If the stated error were only twice the last difference
-    /// between two discretisations, the true error would be 0.74 of it for the seed 7 and 0.99 for the seed 114.
+    /// The true error must be below half of the stated error. It would not be if the stated error were only twice the last
+    /// difference between two discretisations: the true error would be 0.74 of the stated error for the seed 7, and 0.99 for
+    /// the seed 114.
     #[test]
     fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -201,7 +201,8 @@ impl Boundary {
 
     /// Returns panels that are at most `gap` times as long as their distance from another part of
     /// the boundary. On the free surface a panel is at most the fraction `width` of the surface's
-    /// width. The result is `None` if there would be more than `many` panels.
+    /// width, and shorter for more than five `modes`. The result is `None` if there would be more
+    /// than `many` panels.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
         let (longest, z_surface) = match self.ends.get(self.surface) {
@@ -289,9 +290,10 @@ const WIDTH: f64 = 0.35;
 const APEX: f64 = 4.0;
 
 /// Returns the exponents gamma and nu (see [`Panel`]) at a corner between the directions of travel
-/// `before` and `after`. gamma is a whole number, so that the curve is an analytic function of v,
-/// and gamma nu is at least 6. A contour of `many` short segments turns only little at each joint;
-/// such weak corners get a smaller gamma, because they need no panels of their own.
+/// `before` and `after`. gamma is a whole number, so that the curve is an analytic function of v.
+/// At a corner it is the smallest number for which gamma nu is at least 6, but not above 9. If
+/// `many` is true, the contour has many short segments; joints at which it turns by less than 0.3
+/// rad then get a smaller gamma, because such weak corners need no panels of their own.
 fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);

@@ -317,8 +317,8 @@ impl ParameterSet {
     }
 
     /// Returns the parameters as [`ParameterSet::new`] does. If `has_energy` is true, coefficients
-    /// that also give the wave's energy are used where they are known. HubSlosh and tanks with a
-    /// fill table accept only third-order coefficients.
+    /// that also give the wave's energy replace the third-order coefficients if they are known. The
+    /// FMU HubSlosh and tanks with a fill table accept only third-order coefficients.
     pub(crate) fn with_energy(
         tank: &Tank,
         data: &ModalData,

@@ -48,8 +48,9 @@ pub(crate) struct Solution {
     pub(crate) psi: Vec<f64>,
 }
 
-/// A part from v0 to v1 of a panel, with its integration points, and the values of the panel's
-/// Legendre polynomials at these points, one point after the other.
+/// The part of a panel over which the panel's coordinate v goes from `v0` to `v1`. `points` and
+/// `weights` are its integration points with their weights, and `values` are the panel's Legendre
+/// polynomials at these points: first all polynomials at the first point, and so on.
 struct Part {
     v0: f64,
     v1: f64,
@@ -60,11 +61,11 @@ struct Part {
 }
 
 const PART: usize = 16;
-/// Limit of [`bernstein`]'s sum for a part of a panel. If a point x is outside the ellipse with
-/// this sum of semi-axes, the part is integrated with Gauss points; otherwise it is bisected.
+/// Smallest sum of semi-axes (see [`bernstein`]) for a point x at which a part of a panel is
+/// integrated with Gauss points. If the sum is smaller, the part is bisected.
 const FAR: f64 = 2.3;
-/// Limit of [`bernstein`]'s sum for a whole panel. If a point x is outside the ellipse with this
-/// sum of semi-axes, the panel is integrated with its own points, without bisection.
+/// Smallest sum of semi-axes (see [`bernstein`]) for a point x at which a whole panel is integrated
+/// with its own points, without bisection.
 const FAR_WHOLE: f64 = 3.0;
 const ITERATIONS: usize = 30;
 /// Number of integration points on each side of a point x that lies on the integrated panel itself,
@@ -681,10 +682,10 @@ mod tests {
         }
     }
 
-    /// The preimage v of a point, or of its mirror image behind the axis, obeys v^gamma = s + i d:
-    /// s is the nearest place on the panel, and d the distance from it, both as [`Boundary::foot`]
-    /// returns them. The tested points are too close to the panel for integration with the panel's
-    /// own points.
+    /// The preimage v of a point, or of its mirror image behind the axis, obeys v^gamma = s + i d
+    /// with the exponent gamma of the panel. Here s is the nearest place on the panel, and d the
+    /// distance from it, both as [`Boundary::foot`] returns them. The tested points are too close
+    /// to the panel for integration with the panel's own points.
     #[test]
     fn the_preimage_of_a_point_under_a_panel_s_map_is_found() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);

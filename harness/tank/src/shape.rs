@@ -15,8 +15,8 @@ const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
 
-/// A wetted wall with a shape whose damping was measured. The shape is made high enough for the
-/// fill `fill`, m above the lowest point.
+/// A wetted wall with a shape whose damping was measured. `shape` is tall enough to contain the
+/// liquid, whose surface is `fill` m above the lowest point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
     pub shape: Shape,

@@ -32,9 +32,10 @@ pub(crate) const ERRORS: [f64; 2] = [5e-4, 4e-3];
 /// Slosh angles at which the error of a forced response near resonance reaches 3 % or 3 degrees in
 /// a sphere. Each row has h/R and three angles, degrees: with third-order coefficients (the smaller
 /// angle of planar and rotary motion), with the coefficients of [`ROWS`] in planar motion, and with
-/// these in rotary motion. The damping ratio of every mode is 0.01. The tank moves along a line or
-/// on a circle, at the frequency of free waves of 9 degrees and 1 % from it
-/// (`examples/forced_waves.rs`). 14 degrees is the largest angle that was compared.
+/// the coefficients of [`ROWS`] in rotary motion. The damping ratio of every mode is 0.01. The tank
+/// moves along a line or on a circle, at the frequency of free waves of 9 degrees and at
+/// frequencies 1 % below and above it (`examples/forced_waves.rs`). 14 degrees is the largest angle
+/// that was compared.
 const FORCED: [[f64; 4]; 7] = [
     [0.10, 7.1, 8.2, 8.2],
     [0.20, 9.1, 12.5, 8.9],
@@ -45,9 +46,9 @@ const FORCED: [[f64; 4]; 7] = [
     [1.05, 7.1, 11.8, 7.6],
 ];
 
-/// Returns the slosh angles, rad, at which the error of a forced response in a sphere filled to h/R
-/// = `fill` reaches 3 %: with third-order coefficients, with [`energy_terms`] in planar motion, and
-/// with [`energy_terms`] in rotary motion.
+/// Returns three slosh angles, rad, at which the error of a forced response in a sphere filled to
+/// h/R = `fill` reaches 3 %: first of a slosh mass with third-order coefficients, then of a slosh
+/// mass with the coefficients of [`energy_terms`] in planar motion, and in rotary motion.
 pub(crate) fn forced_limits(fill: f64) -> Option<[f64; 3]> {
     let pair = FORCED.windows(2).find(|pair| (pair[0][0]..=pair[1][0]).contains(&fill))?;
     let share = (fill - pair[0][0]) / (pair[1][0] - pair[0][0]);

@@ -222,8 +222,9 @@ mod tests {
         assert!((found.to - found.from - PI).abs() < 1e-15);
     }
 
-    /// The short form of a curve begins with the mirrored last control point, or with its own start
-    /// if the previous curve is of another kind.
+    /// The short form of a curve leaves out the first control point. This point is then the mirror
+    /// image of the previous curve's last control point or, if the previous curve is of another
+    /// kind, the start of the curve.
     #[test]
     fn short_commands_of_an_svg_path_equal_the_long_commands() {
         let read = |path: &str| segments(path, 0.5).unwrap();

@@ -60,11 +60,12 @@ pub const DETUNING: f64 = 0.01;
 /// - `mode`: in round sections the azimuthal number, in sectors the number of half waves over the
 ///   angle, each followed by the number of the mode counted from 1; in boxes the numbers of half
 ///   waves along the motion and across it.
-/// - `planar`, `circular`: squared overlap integrals of the shape chi of this mode with squares of
-///   the first mode psi in planar and in circular motion, divided by int chi^2 and int psi^2. X and
-///   Y are the shapes of the first mode's elevation at two instants a quarter of a period apart.
-///   The first element is the overlap with (X^2 + Y^2)/2, which excites the frequency 0; the second
-///   is the overlap with (X^2 - Y^2)/2 and X Y, which excite twice the frequency of the first mode.
+/// - `planar`, `circular`: for planar and for circular motion, two squared overlap integrals of the
+///   shape chi of this mode with squares of the first mode psi, divided by int chi^2 and int psi^2.
+///   The first element is the overlap with (X^2 + Y^2)/2, which excites the frequency 0. The second
+///   element is the overlap with (X^2 - Y^2)/2 and X Y, which excite twice the frequency of the
+///   first mode. X and Y are the elevations of the first mode at two instants a quarter of a period
+///   apart.
 /// - `at_wall`: chi at the wall times int chi psi^2/int chi^2, for planar motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
@@ -105,8 +106,8 @@ impl Overlaps {
     }
 
     /// Computes the overlap integrals of the first mode u(r) cos(nu theta) with the modes that its
-    /// square excites: `mean` of the azimuthal order 0 and `double` of the order 2 nu. The first
-    /// mode is the first of the modes `first` of the order nu.
+    /// square excites. `first` are the modes of the azimuthal order nu, beginning with the first
+    /// mode. `mean` are the modes of the order 0, and `double` the modes of the order 2 nu.
     fn from_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
         let psi = first.mode(0);
         let mut excited = Vec::new();
@@ -242,8 +243,8 @@ impl Overlaps {
         self.amplitude * self.amplitude * self.excited.iter().map(elevation).sum::<f64>()
     }
 
-    /// Returns k tanh(k h) and the frequency of the first mode at the depth `depth`, m, with g = 1,
-    /// and the first-order amplitude of its potential divided by the first-order amplitude of its
+    /// Returns three quantities of the first mode at the depth `depth`, m, with g = 1: k tanh(k h),
+    /// the frequency, and the ratio of the first-order amplitudes of its potential and its
     /// elevation.
     fn wave(&self, depth: f64) -> [f64; 3] {
         let t_1 = self.k * (self.k * depth).tanh();
@@ -278,10 +279,11 @@ impl Overlaps {
     }
 }
 
-/// Equations for an excited mode with the wave number kappa at the depth h, divided by its overlap
-/// integral with the square of the first mode. `t` is kappa tanh(kappa h), and `elevated` the
-/// source of the constant elevation. The elevation and the potential at twice the frequency of the
-/// first mode are a vector x with `matrix` x + `vector` = 0.
+/// Equations for an excited mode with the wave number kappa at the depth h. They are divided by the
+/// overlap integral of this mode with the square of the first mode. `t` is kappa tanh(kappa h).
+/// `elevated` is the quantity to which the constant elevation is proportional. The elevation and
+/// the potential at twice the frequency of the first mode are the two elements of a vector x with
+/// `matrix` x + `vector` = 0.
 struct Response {
     t: f64,
     elevated: f64,

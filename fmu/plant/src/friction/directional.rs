@@ -78,8 +78,8 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Returns a message for each direction of rotation in which the directional factor of dry friction is not positive at
-    /// every angle of the hub. Dry friction would drive the hub where this factor is negative.
+    /// Returns a message for each direction of rotation in which the directional factor of dry friction falls to 0 or below
+    /// at some angle of the hub. Friction with a negative factor would drive the hub.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];

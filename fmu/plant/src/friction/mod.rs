@@ -71,7 +71,8 @@ pub trait FrictionLaw {
     }
 
     /// Estimates the time, s, over which the series of the friction torque converges, from the hub's rate `omega` and its
-    /// first two derivatives. Only laws whose coefficients do not show this time override the default.
+    /// first two derivatives. The default is infinity. A law overrides it only if the coefficients of its series do not show
+    /// this time to the integrator.
     fn convergence_radius(&self, _omega: &Series) -> f64 {
         f64::INFINITY
     }

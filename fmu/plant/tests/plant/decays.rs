@@ -35,8 +35,9 @@ fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * TAU * 10.0)
 }
 
-/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity the frequency reaches a finite limit,
-/// and the damping of a laminar layer with it. Without capillarity they follow g^(1/2) and g^(-1/4).
+/// The specific force falls from 9.81 m/s2 to a millionth of a m/s2. With capillarity, the frequency and the damping ratio
+/// of a laminar layer reach finite limits. Without capillarity, the frequency falls as g^(1/2), and the damping ratio of a
+/// laminar layer grows as g^(-1/4).
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for capillarity in [true, false] {
@@ -197,8 +198,8 @@ fn breaking_waves_have_more_damping_above_the_onset_in_every_model() {
     }
 }
 
-/// There is no other damping, so that the dissipated power must equal the power that the waves lose, from far above the onset
-/// of breaking to rest. It is never negative.
+/// Breaking waves are the only damping, so that the dissipated power must equal the power that the waves lose, from far
+/// above the onset of breaking to rest. The dissipated power is never negative.
 #[test]
 fn breaking_waves_only_dissipate_energy() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {

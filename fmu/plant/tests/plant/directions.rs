@@ -160,8 +160,8 @@ impl Newton<'_> {
     }
 }
 
-/// `Newton` is integrated by Runge–Kutta in steps h of 0.1 ms, whose relative error (omega h)^4/120 per radian is 1e-12
-/// after three seconds at omega = 14 rad/s. The slosh angles reach 40 degrees.
+/// The reference solution `Newton` is integrated by Runge–Kutta in steps h of 0.1 ms, whose relative error (omega h)^4/120
+/// per radian is 1e-12 after three seconds at omega = 14 rad/s. The slosh angles reach 40 degrees.
 #[test]
 fn the_planar_model_moves_as_newtons_equations_with_guide_forces() {
     for tilt in [0.0, 0.1] {

@@ -18,7 +18,7 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// Break-away torque of the bench's bearing, N m: Coulomb friction plus the excess at rest.
+/// Break-away torque of the bearing with the default parameters, N m: Coulomb friction plus the excess at rest.
 const G_MAX: f64 = 0.003498 + 0.002423;
 
 #[test]

@@ -470,8 +470,8 @@ fn warnings_name_parameters_of_breaking_waves_that_have_no_effect() {
     }
 }
 
-/// With the wave elevation and the wave number of a cylinder in the table, the amplitude at which waves begin to break equals
-/// that of the cylinder.
+/// If the table of modes contains the wave elevation and the wave number of a cylinder, waves begin to break at the same
+/// amplitude as in the cylinder.
 #[test]
 fn wave_steepness_follows_from_the_wave_elevation_and_wave_number_in_the_table() {
     let power = |p: &Parameters| plant(p).outputs(&inputs_with_gravity(9.81)).power_dissipated;

@@ -30,8 +30,8 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The table is tested with wave heights and without; by default the wave height is that of a cylinder with the diameter
-/// `tank.d`.
+/// The table of modes is tested with wave heights and without them. Without them the model uses the wave height of a
+/// cylinder with the diameter `tank.d`.
 #[test]
 fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {

@@ -596,7 +596,8 @@ fn initialization_sets_start_and_stop_time_and_undefined_times_may_be_nan() {
     }
 }
 
-/// The program fmusim 0.8 calls these two functions in continuous-time mode, in which the standard does not allow them.
+/// The program fmusim 0.8 calls fmi3GetNumberOfContinuousStates and fmi3GetNumberOfEventIndicators in continuous-time mode,
+/// in which the standard does not allow them.
 #[test]
 fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
     let host = Mutex::new(TestHost::default());

@@ -42,7 +42,6 @@ impl Default for Parameters {
     }
 }
 
-/// The inputs, each with its value and its slope.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
     q: [[f64; 2]; 2],

@@ -216,7 +216,6 @@ mod tests {
         assert!(Arrays::default().is_empty());
     }
 
-    /// A scalar that is within the present size of its array has a position in it; beyond the size there is none.
     #[test]
     fn every_scalar_variable_within_the_size_of_its_array_has_an_index() {
         let arrays = Arrays::new::<Trays>(&parameters(2));

@@ -92,9 +92,10 @@ impl Function {
         }
     }
 
-    /// Returns pairs (azimuth, phase) at which the elevation determines the wave everywhere. They
-    /// are fewer than all pairs, because the wave has the symmetry (theta + pi, tau + pi) and, in
-    /// plane motion, the symmetry -theta. `count` sets the resolution.
+    /// Returns the pairs (azimuth, phase) at which the equations of a wave are evaluated. Half of
+    /// all azimuths are enough, because the wave has the symmetry (theta + pi, tau + pi); in plane
+    /// motion, which also has the symmetry -theta, a quarter of them is enough; on a circle, one
+    /// phase. `count` is the number of azimuths in half a turn.
     pub(super) fn grid(self, count: usize) -> Vec<[f64; 2]> {
         let half = |n: usize| PI * (n as f64 + 0.5) / count as f64;
         let [thetas, taus] = match self.space {
@@ -169,8 +170,8 @@ fn second_derivative(values: &[f64], tau: f64) -> f64 {
 ///
 /// - `drag`: damping matrix for the coefficients of the potential: the sum of 2 zeta omega_n u_n
 ///   u_n^T over all modes n, where u_n is the vector of the coefficients of mode n.
-/// - `first`: indices of the terms of the first mode: cos(tau) and sin(tau) along x, and then along
-///   y.
+/// - `first`: indices of the terms of the first mode, with the phase tau: cos(tau) and sin(tau) of
+///   the motion along x, and then of the motion along y.
 pub struct Forced<'a> {
     solver: Solver<'a>,
     drag: DMatrix<f64>,
@@ -318,9 +319,10 @@ impl<'a> Forced<'a> {
         None
     }
 
-    /// Computes a wave for each of the ascending `sizes`. The first mode of a wave is its size
-    /// times `shape`, which has the coefficients of cos(tau) and sin(tau) along x, and then along
-    /// y. The list ends where Newton's method does not converge.
+    /// Computes a wave for each of the ascending `sizes`. In each wave the first mode has the
+    /// coefficients `shape` times the size. `shape` contains the coefficients of cos(tau) and
+    /// sin(tau), with the phase tau, for the motion along x, and then for the motion along y. The
+    /// list ends where Newton's method does not converge.
     pub fn waves(&self, shape: &[f64], sizes: &[f64]) -> Vec<(DVector<f64>, ForcedWave)> {
         let [nz, nc, pushes] = self.sizes();
         let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
@@ -343,8 +345,8 @@ impl<'a> Forced<'a> {
 
     /// Computes the wave in a tank that moves along x with the acceleration `push` cos(tau), in
     /// units of g. `x` holds the unknowns of a similar wave. If Newton's method does not converge,
-    /// the acceleration is changed from its value in this wave to `push` in several steps. It
-    /// requires [`Space::All`].
+    /// the acceleration is changed from its value in this wave to `push` in several steps. The
+    /// solver must have been created with [`Space::All`].
     pub fn on_a_line(&self, x: &DVector<f64>, push: f64) -> Option<ForcedWave> {
         let [nz, nc, pushes] = self.sizes();
         let from = x.rows(nz + nc + 1, pushes).into_owned();
@@ -409,8 +411,9 @@ enum Held {
 }
 
 /// Returns the sum of omega_n u_n u_n^T over the modes n of the azimuthal number `m`, divided by
-/// the square root of the specific force. The vector u_n has the coefficients of the mode's
-/// potential in the orthonormal combinations of harmonics.
+/// the square root of the specific force. The potential of mode n is a sum of the combinations of
+/// solid harmonics that `Liquid::harmonics` returns, and the vector u_n contains the coefficients
+/// of this sum.
 fn drag_of_modes(solver: &Solver, m: usize) -> DMatrix<f64> {
     let Resolution { degree, polynomials, .. } = solver.resolution;
     let (f, harmonics) =
