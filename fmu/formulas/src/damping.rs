@@ -154,8 +154,8 @@ pub struct Part {
 }
 
 /// Smallest fraction of the wetted wall at which a measured shape has its full effect on the interval of [`estimate`]; a
-/// smaller part has an effect in proportion to its fraction. A wall counts as a wall of several shapes if at least this
-/// fraction does not have the main shape.
+/// smaller part has an effect in proportion to its fraction. A wall counts as a wall of one shape if less than this fraction
+/// has another shape.
 const COUNTS: f64 = 0.05;
 
 /// Smallest ratio of a correlation's damping to the damping of the laminar layer at which the correlation still has some

@@ -84,8 +84,9 @@ impl LimitedBy {
 /// Allowed relative error of a slosh model's natural frequency, compared with fully nonlinear potential flow. The slosh angle
 /// at which the error reaches this value is the end of the model's range.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of a slosh model's natural frequency at which the error of a response to forcing near resonance reaches 3
-/// %. It applies if the response is wrong only because frequency and amplitude are related differently in model and liquid.
+/// Relative error of a slosh model's natural frequency at which its forced response near resonance has an error of 3 %. The
+/// value applies if this response is wrong only because the frequency depends on the amplitude differently in model and
+/// liquid.
 pub const FORCED: f64 = 8.5e-4;
 
 /// Relative error of the third-order model's frequency from which on its response to forcing counts as wrong by 3 %. It is
@@ -140,7 +141,7 @@ pub struct AngleLimit {
 /// Returns the largest valid slosh angles of a model of the first mode in an upright cylinder filled to h/R = `fill`.
 /// `shifts` describes the model: the relative change of the squared natural frequency per squared slosh angle in planar and
 /// in circular motion. A linear mode has 0 and 0, a pendulum -1/8 and 1/2; `None` stands for a motion that the model cannot
-/// make. A difference between these shifts and those of third-order theory adds to the error of third-order theory.
+/// make. A difference between these shifts and the shifts by third-order theory adds to the error of third-order theory.
 pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     let (s, kappa) = third_order::coefficients(fill);
     let own = |error: f64, column: usize| {

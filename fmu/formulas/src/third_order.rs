@@ -64,7 +64,8 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
 const DETUNING: f64 = 0.01;
 
 /// Range of fills h/R in which the coefficients are interpolated, because third-order theory has a pole wherever an excited
-/// mode has twice the frequency of the first mode. Mode (2,2) has it at 0.831 and mode (0,2) at 1.010.
+/// mode has twice the frequency of the first mode. Mode (2,2) has the pole at h/R = 0.831 and mode (0,2) at 1.010; the two
+/// numbers of a mode are its azimuthal and its radial number.
 pub const BRIDGED: [f64; 2] = [0.70, 1.20];
 
 /// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of the first slosh mode of an upright cylinder

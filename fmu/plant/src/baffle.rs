@@ -177,9 +177,10 @@ impl Baffle {
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts the power series of the drag, and returns the drag coefficient of baffle and viscosity together at their start.
-    /// `w` is the squared natural frequency W and its rate. `at` contains the squares of the slosh angle and of its rate. `m` is
-    /// the slosh mass, kg, and `c` the viscous drag coefficient, which changes in time as the series `viscous`.
+    /// Starts the power series of the drag, and returns the sum of the drag coefficients by baffle and viscosity at the
+    /// start of the series. `w` is the squared natural frequency W and its rate. `at` contains the squares of the slosh
+    /// angle and of its rate. `m` is the slosh mass, kg, and `c` the viscous drag coefficient, which changes in time as the
+    /// series `viscous`.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;

@@ -59,8 +59,8 @@ impl Damping {
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. The result is 0 without restoring force, where
-    /// the ratio has no meaning, and so close to this case that the formula overflows.
+    /// Returns the damping ratio of mode `n` at the specific force `g`, m/s2. The result is 0 if there is no restoring
+    /// force, because the ratio then has no meaning, and also if the force is so small that the formula overflows.
     pub fn ratio(&self, n: usize, g: f64) -> f64 {
         let (zeta, a) = (self.zeta[n], self.centring[n]);
         match self.exponent == 0.25 {

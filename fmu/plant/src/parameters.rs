@@ -129,7 +129,7 @@ impl ModeTable {
     }
 
     /// Returns the pendulum length l of mode `n`, m. If the frequency f is given instead of the length, l follows from (2 pi
-    /// f)^2 = g_ref/l + k/m with the specific force g_ref, the centring stiffness k and the slosh mass m.
+    /// f)^2 = g_ref/l + k/m with the specific force g_ref, the stiffness k by surface tension and the slosh mass m.
     pub(crate) fn pendulum_length(&self, n: usize) -> f64 {
         if self.length[n] > 0.0 {
             return self.length[n];

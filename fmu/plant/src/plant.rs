@@ -454,9 +454,9 @@ impl Plant {
         self.evaluate_ranges(&outputs)
     }
 
-    /// Sets the contact that belongs to the present inputs, and returns the previous contact, which [`Plant::revert_contact`]
-    /// restores. The contact can differ because a torque that has changed since the last step may break the hub away, or may
-    /// cancel a break-away at this instant.
+    /// Sets the contact (stick or slip) that belongs to the present inputs, and returns the previous contact, which
+    /// [`Plant::revert_contact`] restores. The contact can differ because a torque that has changed since the last step may
+    /// break the hub away, or may cancel a break-away at this instant.
     pub fn apply_present_contact(&mut self, inputs: &Inputs) -> Contact {
         let before = self.state.contact;
         if self.omega() == 0.0 {
@@ -465,8 +465,8 @@ impl Plant {
         before
     }
 
-    /// Sets the contact that belongs to the present inputs, as [`Plant::apply_present_contact`] does, and keeps it: the next
-    /// step begins with this contact.
+    /// Sets the contact (stick or slip) that belongs to the present inputs, as [`Plant::apply_present_contact`] does, and
+    /// keeps it: the next step begins with this contact.
     pub fn take_present_contact(&mut self, inputs: &Inputs) {
         if self.omega() == 0.0 {
             let (contact, time) = (self.present_contact(inputs), self.state.time);

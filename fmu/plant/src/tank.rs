@@ -29,8 +29,8 @@ use crate::slosh_model::SloshModel;
 /// Values that were calculated from the parameters; 0 for unused modes.
 /// - `m_liq`, `m_0`: masses of the whole liquid and of the rigid liquid, kg.
 /// - `bond`: Bond number rho g R^2/sigma.
-/// - `mass`, `length`: slosh mass, kg, and pendulum length, m, of each mode; on a tilted bench those of an oblique pendulum
-///   with the same frequency.
+/// - `mass`, `length`: slosh mass, kg, and pendulum length, m, of each mode; on a tilted bench the values of an oblique
+///   pendulum with the same frequency.
 /// - `frequency`: natural frequency of each mode, Hz.
 /// - `damping`: damping ratio of each mode.
 /// - `centring`: increase of g that is equivalent to the stiffness by surface tension, m/s2.
@@ -255,7 +255,8 @@ impl Slosh {
 }
 
 /// Returns a message for each mode of the slosh model `liquid` whose inertia falls with the amplitude (s <= 0). These modes
-/// are refused, because the kinetic energy of hub and liquid would not be positive at amplitudes that depend on the hub.
+/// are refused, because above some amplitude, which depends on the hub, the kinetic energy of hub and liquid would not be
+/// positive.
 fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     let (fill, slosh) = (2.0 * p.tank.h / p.tank.d, p.slosh);
     let falling =
@@ -324,10 +325,10 @@ const LOW_BOND: f64 = 100.0;
 impl Calculated {
     /// Calculates the modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation gives the damping ratio of the first mode. In the higher modes the ratio of this damping to the
-    /// damping of the laminar layer at the wall is the same as in the first mode (`formulas::damping`). Without restoring
-    /// force, that is, without g and surface tension, there is no frequency, and the damping ratio, which then has no
-    /// meaning, is 0.
+    /// The correlation gives the damping ratio of the first mode. The damping ratio of each higher mode, divided by the
+    /// damping ratio of the laminar layer at the wall, is the same as for the first mode (`formulas::damping`). Without
+    /// restoring force, that is, without g and surface tension, there is no frequency, and the damping ratio, which then has
+    /// no meaning, is 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;

@@ -33,8 +33,8 @@ pub enum StepEnd {
 
 /// A dynamic system with inputs, parameters, continuous states and events.
 ///
-/// The runtime saves the state of a simulation as a clone of the model, so that a model must not keep data elsewhere. All
-/// times are in s. Functions that a smooth model without events does not need have a default implementation.
+/// The runtime saves the state of a simulation as a clone of the model, so that a model must not keep data outside itself.
+/// All times are in s. Functions that a smooth model without events does not need have a default implementation.
 #[allow(missing_docs)]
 pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// All parameters of the model; their default values are the start values.
@@ -184,9 +184,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         Ok(())
     }
 
-    /// Writes the event indicators to `indicators`. Each of them changes its sign at an event. There are
-    /// [`About::event_indicators`](crate::table::About::event_indicators) of them; a host with a reduced model description
-    /// reads only the first ones (see [`Dynamics::INDICATORS_OF`]).
+    /// Writes the event indicators, each of which changes its sign at an event, to `indicators`. Their number is
+    /// [`About::event_indicators`](crate::table::About::event_indicators); a host with a reduced model description reads
+    /// only the first ones (see [`Dynamics::INDICATORS_OF`]).
     fn event_indicators(&mut self, inputs: &Self::Inputs, indicators: &mut [f64]) {
         let _ = (inputs, indicators);
     }

@@ -82,7 +82,8 @@ impl Extent {
     }
 
     /// Reads the start values of the reduced description from the file [`START_VALUES`] in the folder `resources`. If the
-    /// token contains no checksum of this file, the description has the start values of the table, and nothing is read.
+    /// token of the description (GUID or instantiationToken) contains no checksum of this file, the description has the
+    /// start values of the table, and nothing is read.
     ///
     /// # Errors
     /// If the file is missing, belongs to another description, or does not match the table.
@@ -208,8 +209,8 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if a reduced description with these `sizes` contains this scalar. `sizes` are the largest values of the
-    /// parameters that count elements, with their names.
+    /// Returns true if a reduced model description with these `sizes` contains this scalar. `sizes` are the largest values
+    /// of the parameters that count elements, with their names.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {

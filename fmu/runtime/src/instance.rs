@@ -299,7 +299,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
     }
 
-    /// Returns the warnings at the start of the simulation: those of the model
+    /// Returns the warnings at the start of the simulation: the warnings of the model
     /// ([`Dynamics::warnings`](crate::model::Dynamics::warnings)), and one for each reason why parameters that differ from
     /// their start values have no effect ([`Dynamics::overridden`](crate::model::Dynamics::overridden)).
     pub fn warnings(&self) -> Vec<String> {
@@ -825,8 +825,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(found.map(|(known, _)| V::reference(known)).collect())
     }
 
-    /// Changes all states and inputs by up to `share` of their nominal values; each number `point` gives another change. The
-    /// derivatives at such nearby points show which dependencies vanish only at the present point.
+    /// Changes all states and inputs by up to `share` of their nominal values; different numbers `point` give different
+    /// changes. The derivatives at such nearby points show which dependencies vanish only at the present point.
     fn move_aside(&mut self, share: f64, point: u64) {
         // Multiples of the golden ratio fill the interval uniformly.
         let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;

@@ -4,7 +4,7 @@ pub use crate::dynamics::{Dynamics, Instant, StepEnd, StepFailure};
 use crate::table::{Scalar, Table};
 use crate::variable::Causality;
 
-/// [`Dynamics`] with the table of its variables.
+/// A dynamic system ([`Dynamics`]) with the table of its variables.
 pub trait Model: Dynamics {
     /// Returns the table of variables and further contents of the model description.
     fn table() -> &'static Table<Self>;

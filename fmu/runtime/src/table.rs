@@ -315,7 +315,8 @@ impl<M: Dynamics> Table<M> {
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the derivatives of the continuous states. In Model Exchange, states and nominal values have the same order.
+    /// Returns the derivatives of the continuous states, in the order in which a host of Model Exchange reads the states and
+    /// their nominal values.
     #[inline]
     pub const fn derivatives(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.derivatives;

@@ -44,7 +44,7 @@ use crate::third_order::circle_basis;
 /// rest. The first mode of a cylinder has 2e-5 of its motion at this depth.
 const DEEP: f64 = 3.0;
 
-/// Smallest eigenvalue of the matrix of kinetic energy, divided by its largest eigenvalue, for
+/// Smallest ratio of an eigenvalue to the largest eigenvalue of the matrix of kinetic energy for
 /// which the eigenvector is used. Eigenvectors with smaller eigenvalues consist of rounding errors.
 const NOISE: f64 = 1e-13;
 
@@ -380,10 +380,10 @@ pub(crate) struct Harmonics {
 }
 
 /// Computes the waves of the first mode to third order with solid harmonics up to `degree`. The
-/// coordinates have lines that run from the surface into the liquid and follow the wall. The slope
-/// of a line is proportional to its radius to the power `lines`, an odd number, on which the result
-/// must not depend. The second-order response is computed at the frequency 2 omega (1 +
-/// `detuning`), so that the influence of a nearby resonance can be seen. Returns `None` for a
+/// computation uses curved coordinates, whose lines run from the surface into the liquid and follow
+/// the wall. The slope of a line is proportional to its radius to the power `lines`, an odd number;
+/// the result must not depend on it. The second-order response is computed at the frequency 2 omega
+/// (1 + `detuning`), so that the influence of a nearby resonance can be seen. Returns `None` for a
 /// liquid with a hole, such as a ring.
 pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Option<Waves> {
     let liquid = Liquid::new(wall, degree)?;

@@ -10,8 +10,8 @@ use crate::modal::ModalData;
 use crate::parameters::ParameterSet;
 use crate::table::{format_length, significant};
 
-/// Largest interpolation error of s (relative to 1 + |s|) or of kappa (relative to 1 + |kappa|)
-/// between two points of a fill table that is accepted without a warning.
+/// Largest interpolation error between two points of a fill table that is accepted without a
+/// warning: of s relative to 1 + |s|, and of kappa relative to 1 + |kappa|.
 const LARGEST: f64 = 0.05;
 
 /// Parameters `set` of the tank at the fill `fill`, m above the lowest point, and the mass `liquid`

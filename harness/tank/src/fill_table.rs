@@ -44,9 +44,9 @@ pub struct Between {
     pub rows: Vec<ModalData>,
 }
 
-/// Quantities of the modes at many fills, from which the points of a table are chosen: the mass of
-/// the liquid, kg, and for each mode omega^2/g, 1/m, the height of the slosh mass at rest, m, and
-/// the slosh mass divided by the mass of the liquid.
+/// Quantities of the modes at many fills, from which the points of a fill table are chosen: the
+/// mass of the liquid, kg, and for each mode omega^2/g, 1/m, the height of the slosh mass at rest,
+/// m, and the slosh mass divided by the mass of the liquid.
 struct Curves {
     liquid: Vec<f64>,
     modes: Vec<[Vec<f64>; 3]>,
@@ -90,8 +90,8 @@ impl Curves {
         worst
     }
 
-    /// Returns the largest interpolation error of a table with the points `points`, which are
-    /// indices of fills. The errors of a mode that is lighter than the first mode are weighted with
+    /// Returns the largest interpolation error of a fill table whose rows are at the fills with the
+    /// indices `points`. The errors of a mode that is lighter than the first mode are weighted with
     /// the ratio of the masses.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);

@@ -97,8 +97,8 @@ impl Coefficients {
 
     /// Adds the angle limits and the energy coefficients of an upright cylinder filled to h/R =
     /// `fill`. Near the poles of the third-order theory, s, kappa and the second-order wave are
-    /// interpolated over the fill; `second` returns this wave at a fill. `wave` is the elevation at
-    /// the wall per slosh angle, m/rad.
+    /// interpolated over the fill; `second` returns the second-order wave at a given fill. `wave`
+    /// is the elevation at the wall per slosh angle, m/rad.
     fn cylinder_coefficients(
         self,
         fill: f64,

@@ -26,8 +26,8 @@ impl Fluid {
 /// A mode with capillarity.
 ///
 /// - `omega2`: square of the natural frequency, 1/s².
-/// - `spring`: centring stiffness at the slosh mass, N/m, which is slightly negative for a wetting
-///   liquid at a large Bond number.
+/// - `spring`: stiffness that surface tension adds at the slosh mass, N/m, which is slightly
+///   negative for a wetting liquid at a large Bond number.
 /// - `outside`: a sentence for each range of validity of the formula that the tank leaves.
 /// - `unknown`: true if the formula does not apply to this tank and its contribution exceeds 10 %
 ///   of omega^2.
@@ -43,8 +43,9 @@ pub struct Capillary {
 /// flat surface is used for a mode whose shape is changed by capillarity.
 const LARGEST_SHARE: f64 = 0.1;
 
-/// Returns the specific force, m/s², below which [`flat`] is not valid for a mode whose shape is
-/// changed by capillarity. `tension` is the surface tension divided by the density, m³/s².
+/// Returns the specific force, m/s², below which the formula for a flat surface ([`flat`]) is not
+/// valid for a mode whose shape is changed by capillarity. `tension` is the surface tension divided
+/// by the density, m³/s².
 pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
     tension * mode.surface_gradient / LARGEST_SHARE
 }

@@ -175,9 +175,9 @@ pub struct Capillarity {
     pub warnings: Vec<String>,
 }
 
-/// A mode with surface tension: natural frequency `omega`, rad/s, and centring stiffness `k` at the
-/// slosh mass, N/m, which is negative if a curved meniscus lowers the frequency. Both are `None` if
-/// no formula is valid.
+/// A mode with surface tension: natural frequency `omega`, rad/s, and the stiffness `k` that
+/// surface tension adds at the slosh mass, N/m, which is negative if a curved meniscus lowers the
+/// frequency. Both are `None` if no formula is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CapillaryMode {
     pub omega: Option<f64>,
@@ -647,9 +647,9 @@ fn approximate(
 mod tests {
     use super::*;
 
-    /// The stated error is twice the difference of two discretisations, divided by a reference:
-    /// lambda and beta by their own values, masses by the liquid's 5 kg, moments by 5 kg times R =
-    /// 2 m, waves by R, inertias by 5 kg R^2.
+    /// The stated error is twice the difference of two discretisations, divided by a reference. For
+    /// lambda and beta the reference is their own value, for masses the liquid's 5 kg, for moments
+    /// 5 kg times R = 2 m, for waves R, and for inertias 5 kg R^2.
     #[test]
     fn each_stated_error_is_relative_to_its_reference_quantity() {
         let approximation = |change: &dyn Fn(&mut Mode)| {
@@ -686,7 +686,8 @@ mod tests {
         assert!((ratios.1.0 - 2.0 / 3.0).abs() < 1e-15 && (ratios.1.1 - 2.0 / 3.0).abs() < 1e-15);
     }
 
-    /// A sphere that is nearly full has a free surface much smaller than the tank.
+    /// The test uses a sphere that is nearly full, because its free surface is much smaller than
+    /// the tank.
     #[test]
     fn stated_errors_of_modes_are_relative_to_the_radius_of_the_free_surface() {
         let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];

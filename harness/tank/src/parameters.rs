@@ -55,7 +55,7 @@ impl Target {
 /// - `gravity`: specific force along the tank's axis, m/s², at least 0, for which damping ratios
 ///   and stiffnesses are computed.
 /// - `nu`: kinematic viscosity, m²/s; without it the damping ratios are not set.
-/// - `sigma`: surface tension, N/m; without it there is no centring stiffness.
+/// - `sigma`: surface tension, N/m; without it the stiffnesses by surface tension are 0.
 /// - `contact_angle`: angle between surface and wall, measured in the liquid, degrees; 90 is a flat
 ///   surface.
 /// - `spin`: rate at which tank and liquid rotate together about the tank's axis, rad/s, if they
@@ -183,7 +183,7 @@ fn with_capillarity(
     all
 }
 
-/// Returns the centring stiffnesses of the modes by surface tension, N/m. A negative stiffness is
+/// Returns the stiffnesses that surface tension adds to the modes, N/m. A negative stiffness is
 /// replaced by 0, because the FMUs do not accept it. Warnings are added to `set`.
 fn springs(
     tank: &Tank,

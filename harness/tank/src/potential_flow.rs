@@ -326,10 +326,10 @@ impl Discretisation {
         Part { v0, v1, points, weights, values, halves: None }
     }
 
-    /// Returns the points of the complex plane of a panel's coordinate that the panel maps to the
-    /// point `x`, and to the mirror image of `x` behind the axis, because the kernels are singular
-    /// there. A point is `None` if it is far from the panel. `ends` are the ends of the panel and
-    /// `length` its length, m.
+    /// Returns the complex values of a panel's coordinate that the panel maps to the point `x`, and
+    /// to the mirror image of `x` behind the axis. The kernels of the integral equation are
+    /// singular at these values. A value is `None` if it is far from the panel. `ends` are the ends
+    /// of the panel and `length` its length, m.
     fn preimages(
         &self,
         panel: &Panel,
@@ -649,8 +649,8 @@ mod tests {
         assert_eq!([bernstein([1.0, 0.0], 1.0, 3.0), bernstein([2.5, 0.0], 1.0, 3.0)], [1.0; 2]);
     }
 
-    /// Integrates v^k log|v - x| for k = 0 and 1, and polynomials. With 20 points on each side of
-    /// x, concentrated by the fifth power, the error of the logarithm is 1e-12.
+    /// The test integrates v^k log|v - x| for k = 0 and 1, and polynomials. With 20 points on each
+    /// side of x, concentrated by the fifth power, the error of the logarithm is 1e-12.
     #[test]
     fn quadrature_on_a_panel_with_a_logarithmic_singularity_is_exact() {
         let mesh = Discretisation::new(&walls()[0], 3, 12, false);

@@ -116,13 +116,13 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     KINDS.into_iter().filter_map(of_kind).collect()
 }
 
-/// Distance of a wall from a shape, relative to the wall's size, from which on the wall does not
-/// count as this shape.
+/// Distance of a wall from a shape, relative to the wall's size, at and above which the wall does
+/// not count as this shape.
 const FAR: f64 = 0.01;
 
-/// Distance of a wall from a shape, relative to the smaller of depth and largest radius, from which
-/// on the wall does not count as similar to this shape. For example, a spheroid that differs by a
-/// few per cent from a sphere dissipates as much as the sphere.
+/// Distance of a wall from a shape, relative to the smaller of depth and largest radius, at and
+/// above which the wall does not count as similar to this shape. For example, a spheroid that
+/// differs by a few per cent from a sphere dissipates as much as the sphere.
 const NEAR: f64 = 0.1;
 
 const LEAST: f64 = 0.02;
@@ -192,9 +192,10 @@ impl Kind {
         }
     }
 
-    /// Returns the lower part of the wall that has a shape of this kind, while other kinds are
-    /// disregarded. `points` are points of the wall, and `fill` is the height of the free surface
-    /// above the lowest point, m. Returns `None` if the share of the part is at most [`LEAST`].
+    /// Returns the part of the wall, from the lowest point upwards, that has a shape of this kind
+    /// (for example a sphere), without regard to other kinds. `points` are points of the wall, and
+    /// `fill` is the height of the free surface above the lowest point, m. Returns `None` if the
+    /// share of the part is at most [`LEAST`].
     fn part(self, points: &[Point], fill: f64) -> Option<Part> {
         let whole = Cut::from_whole_wall(points, fill)?;
         let lowest =

@@ -156,8 +156,8 @@ mod tests {
 
     use super::*;
 
-    /// The expected factor is 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a hub at rest and for a hub that
-    /// turns.
+    /// The expected directional factor of dry friction is 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a
+    /// hub at rest and for a hub that turns.
     #[test]
     fn each_harmonic_of_the_friction_over_the_angle_has_the_documented_sign() {
         let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };

@@ -18,8 +18,8 @@ use crate::hub::HubMotion;
 use crate::parameters::{Friction, FrictionModel};
 use directional::DirectionalFactor;
 
-/// A friction law as a set of power series in time. A law may have one continuous state of its own, for example the
-/// deflection of bristles, and may use another formula for each direction of rotation.
+/// A friction law of the bearing, whose quantities are power series in time. A law may have one continuous state of its own,
+/// for example the deflection of bristles, and may use another formula for each direction of rotation.
 pub trait FrictionLaw {
     /// True if the law changes its formula when the hub comes to rest, so that this instant must be located. If false, the
     /// contact is always [`Contact::Forward`].

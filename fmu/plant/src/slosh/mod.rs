@@ -165,7 +165,7 @@ impl<T: Number> Angles<T> {
     }
 }
 
-/// One slosh mode as a set of power series in time.
+/// One mode of a slosh model, whose quantities are power series in time.
 ///
 /// Functions that are generic over [`Number`] apply to the start of the series: they return a value, or its directional
 /// derivative. In the other functions `ramp` is true if the specific force changes along the series, and `varies` is true if
@@ -186,7 +186,7 @@ pub trait SloshMode {
     fn amplitude2<T: Number>(&self) -> [T; 2];
     fn coordinates(&self, at: &Angles) -> [f64; 4];
     fn angles<T: Number>(&self) -> Angles<T>;
-    /// Sets the coordinates `q` at the start of the series. Coefficient 0 of the hub's rate must be known.
+    /// Sets the coordinates of the mode to `q` at the start of the series. Coefficient 0 of the hub's rate must be known.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
     /// Sets Taylor coefficient 1 of the coordinates to `dq`, their change in a directional derivative. Coefficients 0 and 1
     /// of the hub's rate must be known.

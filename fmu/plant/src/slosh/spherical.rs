@@ -323,9 +323,9 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the stereographic coordinates xi and their rates from the direction p, a unit vector, and the velocity v of
-    /// the slosh mass, by xi = p/k and k xi' = p' + v_z xi with k = 1 - p_z. If the slosh mass is above its hinge, k is
-    /// computed from |p| = 1 instead, because the difference 1 - p_z would lose digits.
+    /// Computes the stereographic coordinates xi and their rates from the direction p of the slosh mass, a unit vector, and
+    /// its velocity v: xi = p/k and k xi' = p' + v_z xi with k = 1 - p_z. If the slosh mass is above its hinge, this
+    /// difference would lose digits, and k is computed from |p| = 1 instead.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);

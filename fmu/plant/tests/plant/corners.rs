@@ -103,7 +103,7 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
 
 /// Simulates random tables of torque in steps that are as long as the rows of the table, and compares the states with a
 /// reference in steps of 1 ms at a tolerance of 1e-13. The allowed error is 30 times the tolerance. Where the motion itself
-/// amplifies errors, it is multiplied by the growth of a small change of the initial state.
+/// amplifies errors, the allowed error is multiplied by the growth of a small change of the initial state.
 fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
     let (mut worst, mut compared, mut ended) = ((0.0, 0, 0.0), 0, 0);
     for seed in seeds {

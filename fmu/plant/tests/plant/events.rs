@@ -196,7 +196,8 @@ fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
     }
 }
 
-/// The speed of the rotor falls by 1 rad/s per second and reaches its lowest value after a quarter of a second.
+/// In the first case the speed of the rotor falls by 1 rad/s per second and reaches its lowest value after a quarter of a
+/// second. In the second case the torque command rises through 0 and the torque limit of the wheel.
 #[test]
 fn a_step_stops_where_the_wheel_reaches_a_limit_or_its_torque_passes_0() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);

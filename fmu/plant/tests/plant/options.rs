@@ -267,7 +267,7 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     );
 }
 
-/// Under a ring baffle the damping ratio at the amplitude a is Z a^(1/2) with a constant Z, so that a^(-1/2) grows at the
+/// With a ring baffle the damping ratio at the amplitude a is Z a^(1/2) with a constant Z, so that a^(-1/2) grows at the
 /// rate Z omega/2. The oscillation starts at 0.1 rad and lasts ten periods. The tolerance of 1 % includes the effect of the
 /// ring on the frequency and the cubic terms of the pendulum.
 #[test]

@@ -165,8 +165,9 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
 }
 
 /// The output `limited_by` names the limit of the slosh model that the motion has passed. For each limit the test has a
-/// plant just beyond it and a plant just within it. The bench's cylinder has h/R = 1.227; there the squared frequency
-/// changes by the factors 1 - 0.429 A^2 in planar and 1 + 0.367 A^2 in circular motion at the slosh angle A.
+/// plant just beyond it and a plant just within it. In the cylinder of the default bench, which is filled to h/R = 1.227,
+/// the squared frequency changes by the factors 1 - 0.429 A^2 in planar and 1 + 0.367 A^2 in circular motion at the slosh
+/// angle A.
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {

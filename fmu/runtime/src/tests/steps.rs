@@ -117,8 +117,8 @@ fn no_step_is_allowed_after_a_step_that_ends_at_the_stop_time() {
     );
 }
 
-/// The inflow q must not fall below 1. Because of rounding, a ramp that falls from 4 may end below 1 by up to 1e-9 of its
-/// fall; it then ends at exactly 1.
+/// The smallest allowed value of the test model's input q, an inflow, is 1. Because of rounding, a ramp that falls from 4
+/// may end below 1 by up to 1e-9 of its fall; it then ends at exactly 1.
 #[test]
 fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     let after = |end: f64| {

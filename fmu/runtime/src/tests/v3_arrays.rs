@@ -99,8 +99,8 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
     }
 }
 
-/// If the number of trays changes, the arrays whose size depends on it get their start values, and all other variables keep
-/// their values. If the number is set to its present value, nothing changes.
+/// If the number of the test model's trays changes, the arrays whose size depends on it get their start values, and all
+/// other variables keep their values. If the number is set to its present value, nothing changes.
 #[test]
 fn changing_the_size_of_an_array_resets_its_elements() {
     let lines = Lines::default();
@@ -188,8 +188,8 @@ fn value_references_of_time_and_event_indicators_follow_those_of_the_scalars() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// Each element of the output `square` depends on all levels and inflows of the present trays, even where all of them are 0,
-/// so that the derivatives vanish. The rate of a level depends only on the inflow of its own tray.
+/// In the test model each element of the output `square` depends on all levels and inflows of the present trays, even where
+/// all of them are 0, so that the derivatives vanish. The rate of a level depends only on the inflow of its own tray.
 #[test]
 fn dependencies_of_array_elements_are_reported_even_where_the_derivative_vanishes() {
     let lines = Lines::default();
