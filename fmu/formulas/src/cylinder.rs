@@ -70,8 +70,8 @@ pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
 }
 
 /// Returns the moment of inertia, divided by the mass, m2, of liquid that completely fills a closed cylinder of the diameter
-/// `d` and the height `h`, m, about an axis through its centre across the cylinder. The value is below that of a rigid body,
-/// because a part of the liquid does not take part in the rotation.
+/// `d` and the height `h`, m, about an axis through its centre across the cylinder. It is smaller than the moment of inertia
+/// of a rigid body, because a part of the liquid does not take part in the rotation.
 pub fn capped_inertia(d: f64, h: f64) -> f64 {
     const ZEROS: usize = 400;
     let radius = d / 2.0;

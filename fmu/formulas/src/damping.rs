@@ -92,12 +92,13 @@ fn weight(number: f64, [low, high]: [f64; 2]) -> f64 {
 
 impl Shape {
     /// Returns the damping ratio of the first slosh mode by the published correlation for this shape; `None` if the shape
-    /// was not measured. `nu` is the kinematic viscosity, m2/s, and `g` is the specific force plus the increase of it that
-    /// has the effect of surface tension, m/s2.
+    /// was not measured. `nu` is the kinematic viscosity, m2/s, and `g`, m/s2, is the specific force plus a term for surface
+    /// tension, which acts like an increase of the specific force.
     ///
     /// In a cylinder the formula of Mikishev and Dorozhkin is used from h/R = 0.5 on. For smaller fills this formula gives
     /// less damping than wall friction alone, so that the formula of Stephens, Leonard and Perry is used. The two formulas
-    /// differ by 7 % at 0.5; between 0.4 ([`SHALLOW`]) and 0.5 the result changes smoothly from one to the other.
+    /// differ by 7 % at 0.5; between 0.4 ([`SHALLOW`]) and 0.5 the result changes smoothly from the second formula to the
+    /// first.
     pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
         let (zeta, weight) = match *self {
             Shape::Cylinder { radius, depth } => {
@@ -362,7 +363,7 @@ pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The expected values, with four digits, were computed by hand for water in the bench's tank of 81.5 mm radius.
+    /// The expected values, with four digits, were computed by hand for water in a tank of 81.5 mm radius.
     #[test]
     fn damping_correlations_have_their_published_coefficients() {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);

@@ -19,7 +19,7 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples that are taken at one instant. More of them are due only if the importing tool does not
+/// Largest number of gyro samples that are taken at one instant. More samples are due only if the importing tool does not
 /// stop at the time events of the FMU.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 

@@ -24,8 +24,8 @@ const RATIO: f64 = 6.0;
 const SHORTEST: f64 = 0.1;
 
 /// State of the gyro. `next` is the number of the next sample; sample k is taken k/rate seconds after the start. `held` is
-/// the reading until then. The bias, the rate random walk `walk` and the processes of the `flicker` noise are those of the
-/// next sample. All values are in rad/s.
+/// the reading until then. The bias, the rate random walk `walk` and the processes of the `flicker` noise have the values
+/// for the next sample. All values are in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
     pub next: u64,

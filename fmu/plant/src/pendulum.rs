@@ -151,7 +151,7 @@ impl Pendulum {
         self.along[0] != 0.0
     }
 
-    /// Returns the reason why mode 1 cannot start with the displacement and rate in `init`, if any: the mode moves along one
+    /// Returns a message if mode 1 cannot start with the displacement and rate in `init`, because the mode moves along one
     /// direction only, and the displacement or the rate has another direction.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;

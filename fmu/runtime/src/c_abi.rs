@@ -195,12 +195,12 @@ pub fn null_argument(call: &Call, name: &str) -> Fault {
 /// error instead of a crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
-/// Returns the mark of a live object: the number in its first word, by which a call recognises that `handle` is valid. `kind`
-/// distinguishes components from saved states.
+/// Returns the mark of a live object: the number in its first word, by which a call recognises that `handle` is valid.
+/// `kind` distinguishes components from saved states.
 ///
-/// The mark depends on the model, the FMI version and the loaded copy of the library, because it is computed from the address
-/// of the variable table and a digit for the version. Handles of other FMUs, of the other FMI version or of a second copy of
-/// the library are therefore recognised as wrong. The upper 16 bits of a mark differ from those of every valid address.
+/// The mark depends on the model, the FMI version and the loaded copy of the library, because it is computed from the
+/// address of the variable table and a digit for the version. Handles of other FMUs, of the other FMI version or of a second
+/// copy of the library are therefore recognised as wrong. No valid address has the upper 16 bits of a mark.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
     // The digit is smaller than the alignment of the table, so that it does not overlap with the table's address.

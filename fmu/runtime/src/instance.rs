@@ -780,7 +780,7 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     /// Returns the value references of the variables on which a variable depends. Before the simulation starts, these are
     /// the dependencies of its initial value. Afterwards they are the declared inputs and states that have an effect at
-    /// present; for example, a variable may depend on fewer of them while the hub sticks. An input or state also counts if
+    /// present; for example, fewer inputs and states have an effect while the hub sticks. An input or state also counts if
     /// the derivative with respect to it vanishes only at the present point.
     pub(crate) fn dependencies(
         &mut self,

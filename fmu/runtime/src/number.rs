@@ -9,7 +9,8 @@ pub const fn is_finite(x: f64) -> bool {
     x.to_bits() & EXPONENT != EXPONENT
 }
 
-/// Formats a number for a message. NaN is recognised without a comparison, for the reason given at [`is_finite`].
+/// Formats a number for a message. NaN is recognised by its bits, because in some hosts a comparison with NaN stops the
+/// program (see [`is_finite`]).
 pub fn text(x: f64) -> String {
     let is_nan = x.to_bits() << 1 > f64::INFINITY.to_bits() << 1;
     if is_nan { "NaN".into() } else { format!("{x:?}") }

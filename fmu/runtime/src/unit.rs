@@ -23,7 +23,8 @@ const fn unit(
     Unit { name, base: Some([kg, m, s, rad]), display_units }
 }
 
-/// All units that the FMUs of this project use. The model description of an FMU contains those of its own variables.
+/// All units that the FMUs of this project use. The model description of an FMU contains only the units of its own
+/// variables.
 #[rustfmt::skip]
 pub static UNITS: &[Unit] = &[
     //                kg  m   s  rad

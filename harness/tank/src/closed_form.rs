@@ -298,9 +298,9 @@ fn effective(a: f64, b: f64) -> f64 {
     b * b / 12.0 - 0.25 * a * a + 64.0 / (a * a * b) * sum
 }
 
-/// Returns the inertia about the vertical axis, kg·m², of the liquid that rotates with a box:
-/// `tank.I_own` in HubSlosh. The sides `length_x` and `length_y` and the fill `h` are in m.
-/// Twisting modes of the surface count as rigid.
+/// Returns the inertia about the vertical axis, kg·m², of the liquid that rotates with a box: the
+/// parameter `tank.I_own` of the FMU HubSlosh. The sides `length_x` and `length_y` and the fill `h`
+/// are in m. Twisting modes of the surface count as rigid.
 pub fn box_yaw_inertia(length_x: f64, length_y: f64, h: f64, rho: f64) -> f64 {
     rho * length_x * length_y * h * effective(length_x, length_y)
 }

@@ -300,7 +300,7 @@ impl Contour {
     }
 
     /// Returns the fill, m above the lowest point, at which the liquid has the volume `volume`, m³.
-    /// It is 0 for no volume, and the largest fill for the whole volume of the tank and more.
+    /// For the tank's volume and for larger volumes it is the largest fill.
     pub(crate) fn fill_from_volume(&self, volume: f64) -> f64 {
         let depth = self.depth();
         if volume <= 0.0 {

@@ -179,8 +179,8 @@ fn check_surfaces(rows: &[ModalData]) -> Result<(), Problems> {
 /// they are known.
 ///
 /// # Errors
-/// The errors of [`ParameterSet::new`]; also if the target is HubSlosh, whose tank does not drain,
-/// or if there are fewer than two fills or more than [`POINTS`].
+/// The errors of [`ParameterSet::new`]; also if the target is the FMU HubSlosh, whose tank does not
+/// drain, or if there are fewer than two fills or more than [`POINTS`].
 pub fn parameters(
     tank: &Tank,
     sweep: &Sweep,

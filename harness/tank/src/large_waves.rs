@@ -407,7 +407,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Computes the base functions of the potential at the heights `z` above the `points`. Each
-    /// element of `walls` contains the radius, slope and curvature of the wall at one of them.
+    /// element of `walls` contains the radius, slope and curvature of the wall at one of these heights.
     /// `c` are the coefficients of the base functions; if they are given, derivatives of the sum of
     /// the base functions are computed, too: the second derivatives with respect to z z, r z and r
     /// r, the first derivative with respect to theta, and the second derivatives with respect to z

@@ -447,9 +447,9 @@ impl Discretisation {
         total
     }
 
-    /// Returns the radius at which the magnitude of the function `u` is largest on the free
-    /// surface, and the value of `u` there, with its sign. `u` is given at all points of the
-    /// boundary.
+    /// Returns the radius on the free surface at which the magnitude of the function `u` is
+    /// largest, and the value of `u` at this radius, with its sign. `u` is given at all points of
+    /// the boundary.
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];

@@ -55,8 +55,8 @@ impl Sweep {
     /// Returns the rows as comma-separated values with a heading, in SI units. Heights count from
     /// the zero of the contour. Damping ratios with their intervals, and the third-order
     /// coefficients of mode 1 with their error and the largest angle of their validity, rad, have
-    /// columns if any row has them. Values that are not known, and modes that a row lacks, are
-    /// empty.
+    /// columns if they are known in at least one row. A cell is empty if its value is not known, or
+    /// if the row has fewer modes.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
         let is_damped = self.rows.iter().any(|row| row.damping.is_some());

@@ -209,8 +209,8 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     -(amplitude2(&plant) / before).ln() / (2.0 * core::f64::consts::TAU * 10.0)
 }
 
-/// The specific force falls from 9.81 to 1, 0.1 or 0.01 m/s². The measured damping ratio must equal that of a run that starts
-/// at the lower value.
+/// The specific force falls from 9.81 to 1, 0.1 or 0.01 m/s². The measured damping ratio must equal the damping ratio of a
+/// run that starts at the lower value.
 #[test]
 fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
     for correlation in [true, false] {
@@ -233,8 +233,8 @@ fn damping_after_a_change_of_g_equals_the_damping_after_a_start_at_the_new_g() {
     }
 }
 
-/// A plant that starts without specific force dissipates nothing. If 1 m/s² acts later, its damping ratio is that of a plant
-/// that starts at 1 m/s².
+/// A plant that starts without specific force dissipates nothing. If 1 m/s² acts later, it has the same damping ratio as a
+/// plant that starts at 1 m/s².
 #[test]
 fn a_plant_that_starts_at_zero_g_has_damping_once_g_acts() {
     for correlation in [true, false] {

@@ -147,8 +147,8 @@ const STEEPNESS: f64 = 2.0 * 1.8411837813 / (1.8411837813 * 1.8411837813 - 1.0);
 /// If breaking waves are the only damping, the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A. Here omega is the
 /// angular frequency, zeta_b the parameter `slosh.zeta_breaking`, sigma the steepness divided by the slosh angle, and s_b
 /// the steepness at which waves begin to break. From the amplitude A_1 on the solution is 1/A = sigma/s_b + (1/A_1 -
-/// sigma/s_b) exp(-omega zeta_b s_b t). The smooth transition of the damping law at the onset adds up to 4e-4 to a steepness
-/// that exceeds the onset by 0.26 to 0.72.
+/// sigma/s_b) exp(-omega zeta_b s_b t). The smooth transition of the damping law at the onset adds at most 4e-4 to a
+/// steepness that exceeds the onset by 0.26 to 0.72.
 #[test]
 fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     let (zeta_b, onset) = (0.05, 0.2);
@@ -236,8 +236,8 @@ fn a_wave_of_vanishing_amplitude_keeps_its_viscous_damping() {
     assert!((measured - zeta - 1e-4).abs() < 2e-8, "{measured} {zeta}");
 }
 
-/// Amplitude-dependent damping (`zeta_amplitude`, ring baffle) uses the slosh angle in the tangential plane. Its sine would
-/// be 6 % smaller at the tested angle.
+/// Damping that grows with the amplitude (`zeta_amplitude`, ring baffle) must use the slosh angle in the tangential plane.
+/// With the sine of this angle, which is 6 % smaller at the tested angle, the spherical pendulum would have less damping.
 #[test]
 fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
     for (zeta_a, width) in [(0.05, 0.0), (0.0, 0.01)] {

@@ -41,8 +41,8 @@ fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
     p
 }
 
-/// The tested pairs of s and kappa include soft and hard springs. For each pair the measured change of the frequency must be
-/// that of third-order theory.
+/// The tested pairs of s and kappa include soft and hard springs. For each pair the measured change of the frequency must
+/// agree with third-order theory.
 #[test]
 fn large_wave_coefficients_in_a_table_give_the_frequency_shifts_of_third_order_theory() {
     for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {

@@ -50,8 +50,8 @@ fn errors_of_states_stay_within_the_solver_tolerance() {
     }
 }
 
-/// For a hub without liquid and friction under a ramp of torque, angle, rate and energies are polynomials of time, which the
-/// integrator solves exactly in steps of any length.
+/// If the torque on a hub without liquid and friction is linear in time, then angle, rate and energies are polynomials of
+/// time, which the integrator computes exactly in steps of any length.
 #[test]
 fn for_polynomial_motion_the_number_of_internal_steps_does_not_depend_on_the_communication_step() {
     let p = bench(SloshModel::Frozen, FrictionModel::None);

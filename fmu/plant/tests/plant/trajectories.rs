@@ -69,8 +69,9 @@ impl Fill {
     }
 
     /// Returns the communication step, s, and a function for the torque at the communication points. A pulse and a release
-    /// are exact. A sine that is replaced by straight lines would lose (w h)^2/12 of its amplitude; therefore the values are
-    /// multiplied by 1/sinc^2(f h), so that the fundamental of the lines is the sine.
+    /// are exact. A sine that is replaced by straight lines with the angular frequency w = 2 pi f would lose (w h)^2/12 of
+    /// its amplitude in steps of h; therefore the values are multiplied by 1/sinc^2(f h), so that the fundamental of the
+    /// lines is the sine.
     fn input<'a>(&'a self, run: &'a Run) -> (f64, impl Fn(f64) -> f64 + 'a) {
         let step = match run.input.as_str() {
             // Stick and slip begin when the torque itself, and not its fundamental, passes a level. For an error of 1e-7 s

@@ -168,8 +168,8 @@ const STATUS: [&str; 5] =
 const SET: [&str; 4] = ["SetReal", "SetInteger", "SetBoolean", "SetString"];
 const LOOK: [&str; 3] = ["GetDerivatives", "GetEventIndicators", "GetContinuousStates"];
 
-/// The expected calls are those of FMI 2.0.1, sections 3.2.3 and 4.2.4. In addition, this FMU lets hosts enter event mode
-/// again from event mode, set time and states in event mode, and terminate after a failed step.
+/// The expected calls are listed in the standard FMI 2.0.1, sections 3.2.3 and 4.2.4. In addition, this FMU lets hosts enter
+/// event mode again from event mode, set time and states in event mode, and terminate after a failed step.
 #[test]
 fn calls_allowed_in_each_state_equal_those_of_the_standard() {
     use InstanceState::*;

@@ -141,7 +141,7 @@ pub fn reference<M: Model>(variable: &Variable<M>) -> u32 {
 }
 
 /// Returns the value reference of the independent variable, the time, which follows the variables of the table. The next
-/// value reference is that of the array of event indicators.
+/// value reference belongs to the array of event indicators.
 pub fn time<M: Model>() -> u32 {
     M::table().variables.len() as u32 + 1
 }
