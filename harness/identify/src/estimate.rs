@@ -37,6 +37,32 @@ impl Estimated {
     }
 }
 
+/// Sum or product of two unknowns, where the recordings do not determine either of the two.
+#[derive(Clone, Debug, Serialize)]
+pub struct Combination {
+    pub name: String,
+    pub of: [String; 2],
+    pub value: f64,
+    pub std: f64,
+    pub unit: String,
+    pub correlation: f64,
+}
+
+impl Combination {
+    pub fn words(&self) -> String {
+        format!(
+            "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",
+            self.of[0],
+            self.of[1],
+            self.correlation,
+            self.name,
+            self.value,
+            self.std,
+            prose(&self.unit)
+        )
+    }
+}
+
 pub(crate) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }

@@ -11,7 +11,7 @@ use formulas::regime::Regime;
 use names::hubslosh::{SloshModel, friction};
 
 use super::causes::{self, Cause, Missing};
-use super::combination::{self, Combination, ONE_WAY};
+use super::combination::{self, ONE_WAY};
 use super::problem::LEAST_FRICTION;
 use super::system::{BenchSystem, Target};
 use crate::bench::identification::{Details, Identification, ModelFit};
@@ -21,6 +21,7 @@ use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
 use crate::engine::minimum::{Curvature, places};
 use crate::engine::{ENDS, Fit, Signal, Solution, Z};
+use crate::estimate::Combination;
 use crate::estimate::{Estimated, fit_percent, mean_square, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};

@@ -1,7 +1,21 @@
 //! Results of friction runs: measured friction over the rate, and deceleration over the hub's angle.
 
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use maud::{Markup, html};
 use nalgebra::{DMatrix, DVector};
+use names::hubslosh::friction;
+use report::page::{axis_chart, render_chart, series};
+use report::svg::{Axis, Style};
 use serde::Serialize;
+
+use crate::estimate::Estimated;
+use crate::tuning::PAGE_POINTS;
+
+/// Smallest number of stretches (parts of a decay within one revolution). The uncertainty of the five coefficients of [`Braking`]
+/// is computed from the scatter between stretches.
+pub(crate) const LEAST_STRETCHES: usize = 10;
 
 /// Friction measured at one rate: mean of the torque minus inertia times acceleration, over rows of similar rate.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -33,7 +47,7 @@ pub struct Braking {
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
     /// Covariance of `coefficients`, computed from the scatter between stretches (see `stretches`). `None` if their number
-    /// is below [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).
+    /// is below [`LEAST_STRETCHES`].
     #[serde(skip)]
     pub(crate) covariance: Option<DMatrix<f64>>,
 }
@@ -69,4 +83,57 @@ impl Braking {
         });
         mean + each.sum::<f64>()
     }
+}
+
+/// Draws the measured friction and the fitted friction curve over the rate, at all speeds and at low speed.
+pub(crate) fn friction_curve(
+    parameters: &BTreeMap<String, Estimated>,
+    points: &[FrictionPoint],
+) -> Markup {
+    let value = |name: &str| parameters.get(name).map_or(0.0, |p| p.value);
+    let [b, c, d] = [friction::B, friction::C, friction::D].map(value);
+    let (speed, asymmetry) = (value(friction::OMEGA_S), value(friction::ASYMMETRY));
+    let curve = |w: f64| {
+        let shape = (-(w / speed).powi(2)).exp();
+        b * w + w.signum() * (1.0 + asymmetry * w.signum()) * (c + d * shape)
+    };
+    let chart = |title: &str, most: f64| {
+        let within: Vec<&FrictionPoint> = points.iter().filter(|p| p.rate.abs() <= most).collect();
+        let rates = || within.iter().map(|p| p.rate);
+        let (low, high) = (rates().fold(0.0, f64::min), rates().fold(0.0, f64::max));
+        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / PAGE_POINTS as f64;
+        let fitted = (0..PAGE_POINTS).map(|k| (at(k), curve(at(k)))).collect();
+        let measured = within.iter().map(|p| (p.rate, p.torque)).collect();
+        let lines = vec![
+            series(fitted, "a", Style::Line, "fitted"),
+            series(
+                measured,
+                "ink",
+                Style::Cloud,
+                "measured: torque less inertia times acceleration",
+            ),
+        ];
+        let label = "friction torque, N·m";
+        let mut chart = axis_chart(title, "rate, rad/s", label, lines, false);
+        // space above the curve, because the curve rises into the corner with the legend
+        let torques = || within.iter().map(|p| p.torque);
+        let top = 1.6 * torques().fold(0.0, f64::max);
+        chart.y = Axis::linear(label, torques().chain([top]), 0.0, 5);
+        render_chart(&chart)
+    };
+    html! {
+        h2 { "Friction" }
+        (chart("Friction torque against the rate, means over rows of similar rate", f64::INFINITY))
+        (chart("The same at low speed", 4.0 * speed))
+    }
+}
+
+pub(crate) fn braking_chart(all: &[Braking]) -> Markup {
+    let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
+        let angle = |k: usize| PI * (2.0 * k as f64 / PAGE_POINTS as f64 - 1.0);
+        let points = (0..=PAGE_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
+        series(points, color, Style::Line, braking.direction)
+    });
+    let title = "Deceleration in free decay over the angle";
+    render_chart(&axis_chart(title, "angle, rad", "rad/s²", lines.collect(), false))
 }

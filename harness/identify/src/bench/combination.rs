@@ -2,42 +2,16 @@
 
 use analysis::statistics::{deviation, mean};
 use names::hubslosh::friction;
-use serde::Serialize;
 
 use crate::engine::draws::Derived;
 use crate::engine::{PAIR, VAGUE};
-use crate::estimate::prose;
+use crate::estimate::Combination;
 
 /// Standard deviation above which an asymmetry of the friction counts as not determined.
 pub const ONE_WAY: f64 = 0.25;
 /// If the angle that the hub turns against its main direction is more than this fraction of the angle in the main direction, the
 /// hub counts as turning both ways.
 const BOTH_WAYS: f64 = 0.05;
-
-#[derive(Clone, Debug, Serialize)]
-pub struct Combination {
-    pub name: String,
-    pub of: [String; 2],
-    pub value: f64,
-    pub std: f64,
-    pub unit: String,
-    pub correlation: f64,
-}
-
-impl Combination {
-    pub fn words(&self) -> String {
-        format!(
-            "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",
-            self.of[0],
-            self.of[1],
-            self.correlation,
-            self.name,
-            self.value,
-            self.std,
-            prose(&self.unit)
-        )
-    }
-}
 
 /// Returns the direction of a hub that turns only one way, from its rates: 1 counter-clockwise, −1 clockwise. Returns `None` for
 /// a hub at rest, or if more than [`BOTH_WAYS`] of its path leads the other way.

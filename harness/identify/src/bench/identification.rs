@@ -2,12 +2,11 @@ use maud::{Markup, html};
 use report::page::table;
 use serde::Serialize;
 
-use super::braking::{Braking, FrictionPoint};
-use super::combination::Combination;
+use super::braking::{Braking, FrictionPoint, braking_chart, friction_curve};
 use crate::bench::causes::{Cause, Missing};
 use crate::bench::nominal::Start;
 use crate::bench::start::Response;
-use crate::methods::friction::{braking_chart, friction_curve};
+use crate::estimate::Combination;
 use crate::words::identified::{Identified, Report};
 use crate::words::page::Sections;
 use analysis::innovations::Tests;
@@ -105,7 +104,7 @@ impl Report for Details {
                 }
             },
             figures: html! {
-                @if !details.friction_points.is_empty() { (friction_curve(found)) }
+                @if !details.friction_points.is_empty() { (friction_curve(&found.parameters, &details.friction_points)) }
                 @if !details.braking.is_empty() { (braking_chart(&details.braking)) }
             },
             combinations: details.combinations.clone(),

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::bench::causes::{Cause, Missing};
-use crate::bench::combination::Combination;
 use crate::bench::identification::ModelFit;
 use crate::engine::DECIDES;
+use crate::estimate::Combination;
 use crate::estimate::{Estimated, prose};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, failed};
 use analysis::innovations::Tests;

@@ -2,20 +2,17 @@
 //! results of the thesis (5.2 to 5.4) are added: the measured friction over the rate, and the deceleration over the hub's angle.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use analysis::innovations::LIMIT;
 use analysis::statistics::{deviation, mean, peak};
 use anyhow::{Result, ensure};
 use host::fmu::Fmu;
-use maud::{Markup, html};
 use nalgebra::{DMatrix, DVector};
 use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, tank};
-use report::page::{axis_chart, render_chart, series};
-use report::svg::{Axis, Style};
 
 use super::output_error;
-use crate::bench::braking::{Braking, FrictionPoint, harmonics_at};
+use crate::bench::braking::{Braking, FrictionPoint, LEAST_STRETCHES, harmonics_at};
 use crate::bench::identification::Identification;
 use crate::bench::nominal::{self, Nominal};
 use crate::bench::options::Options;
@@ -23,7 +20,7 @@ use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::news::News;
 use crate::tuning::{
-    BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, MOVING_SPEED, MOVING_SPREAD, PAGE_POINTS,
+    BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, MOVING_SPEED, MOVING_SPREAD,
 };
 
 /// Fits friction and inertia. Unless the settings state the fill of the tank, the tank is assumed to be empty, and
@@ -164,10 +161,6 @@ fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Ve
     bins.into_values().filter(|bin| bin.2 >= fewest).map(point).collect()
 }
 
-/// Smallest number of stretches (parts of a decay within one revolution). The uncertainty of the five coefficients of [`Braking`]
-/// is computed from the scatter between stretches.
-pub const LEAST_STRETCHES: usize = 10;
-
 /// Fits [`Braking`] separately for both directions. A direction with too few rows is left out.
 fn brakings(recordings: &[Recording], biases: &[f64]) -> Vec<Braking> {
     let mut free: [Vec<FreeRow>; 2] = Default::default();
@@ -254,56 +247,6 @@ fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Brak
         points: rows.iter().map(|row| row.angle).zip(at_speed.iter().copied()).collect(),
         covariance: (stretches >= LEAST_STRETCHES).then_some(covariance),
     })
-}
-
-pub(crate) fn friction_curve(found: &Identification) -> Markup {
-    let points = &found.details.friction_points;
-    let value = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
-    let [b, c, d] = [friction::B, friction::C, friction::D].map(value);
-    let (speed, asymmetry) = (value(friction::OMEGA_S), value(friction::ASYMMETRY));
-    let curve = |w: f64| {
-        let shape = (-(w / speed).powi(2)).exp();
-        b * w + w.signum() * (1.0 + asymmetry * w.signum()) * (c + d * shape)
-    };
-    let chart = |title: &str, most: f64| {
-        let within: Vec<&FrictionPoint> = points.iter().filter(|p| p.rate.abs() <= most).collect();
-        let rates = || within.iter().map(|p| p.rate);
-        let (low, high) = (rates().fold(0.0, f64::min), rates().fold(0.0, f64::max));
-        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / PAGE_POINTS as f64;
-        let fitted = (0..PAGE_POINTS).map(|k| (at(k), curve(at(k)))).collect();
-        let measured = within.iter().map(|p| (p.rate, p.torque)).collect();
-        let lines = vec![
-            series(fitted, "a", Style::Line, "fitted"),
-            series(
-                measured,
-                "ink",
-                Style::Cloud,
-                "measured: torque less inertia times acceleration",
-            ),
-        ];
-        let label = "friction torque, N·m";
-        let mut chart = axis_chart(title, "rate, rad/s", label, lines, false);
-        // space above the curve, because the curve rises into the corner with the legend
-        let torques = || within.iter().map(|p| p.torque);
-        let top = 1.6 * torques().fold(0.0, f64::max);
-        chart.y = Axis::linear(label, torques().chain([top]), 0.0, 5);
-        render_chart(&chart)
-    };
-    html! {
-        h2 { "Friction" }
-        (chart("Friction torque against the rate, means over rows of similar rate", f64::INFINITY))
-        (chart("The same at low speed", 4.0 * speed))
-    }
-}
-
-pub(crate) fn braking_chart(all: &[Braking]) -> Markup {
-    let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
-        let angle = |k: usize| PI * (2.0 * k as f64 / PAGE_POINTS as f64 - 1.0);
-        let points = (0..=PAGE_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
-        series(points, color, Style::Line, braking.direction)
-    });
-    let title = "Deceleration in free decay over the angle";
-    render_chart(&axis_chart(title, "angle, rad", "rad/s²", lines.collect(), false))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use report::page::{axis_chart, document, render_chart, series, table};
 use report::svg::{Chart, Style};
 
-use crate::bench::combination::Combination;
+use crate::estimate::Combination;
 use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::response;
