@@ -128,35 +128,34 @@ impl Mode {
         ww[0] * xx + ww[1] * yy + ww[2] * zz + (ww[3] * xy + ww[4] * xz + ww[5] * yz) * 2.0
     }
 
-    /// Returns the part of -eta'' that does not depend on the craft's accelerations a and w'. `turning` is w.(D w), with the
-    /// symbols of the module's head.
+    /// Returns the part of -eta'' of this mode that does not depend on the craft's accelerations a
+    /// and w': damping, stiffness and the centrifugal term. `turning` is w.(D w), which determines
+    /// the centrifugal term (symbols of the module's head).
     fn pull<T: Number>(&self, eta: T, rate: T, turning: T) -> T {
         rate * self.damping + eta * self.stiffness - turning * 0.5
     }
 }
 
-/// The modes of all appendages. `effective` is the sum of u u^T. `dry` is the dry craft with its appendages undeformed. `shares`
-/// has for each mode an upper bound of the relative change of the dry craft's inertia by a displacement eta = 1. `is_too_heavy`
-/// is true if the participations are so large that the mass matrix is not positive even without deflection.
+/// The modes of all appendages of a craft.
 #[derive(Clone, Debug)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,
-    effective: Mat6,
-    dry: Rigid,
+    effective: Mat6, // sum of u u^T
+    dry: Rigid,      // dry craft with its appendages undeformed
+    // Upper bound of the relative change of the craft's inertia by eta = 1
     shares: [f64; APPENDAGES],
-    is_too_heavy: bool,
+    is_too_heavy: bool, // the mass matrix is not positive even without deflection
 }
 
-/// The deformed appendages at an instant. `body` has the first and second moments that the deflections add to the craft,
-/// `momentum` is [K; L], `slope` is the derivative of the body's inertia by time, and `energy` is the energy of the modes in
-/// a craft at rest.
+/// State of the flexible appendages at an instant, and what they add to the craft (symbols of the
+/// module's head).
 pub(crate) struct Deformed<T> {
     eta: [T; APPENDAGES],
     rate: [T; APPENDAGES],
-    pub body: Rigid<T>,
-    pub momentum: [Vec3<T>; 2],
-    slope: Mat3<T>,
-    pub energy: T,
+    pub body: Rigid<T>,         // first and second moments by the deflections
+    pub momentum: [Vec3<T>; 2], // [K; L]
+    slope: Mat3<T>,             // derivative of the body's inertia by time
+    pub energy: T,              // of the modes in a craft at rest
 }
 
 impl Structure {
@@ -229,7 +228,8 @@ impl Structure {
         }
     }
 
-    /// Returns the deformed appendages at an instant from the continuous states `x`.
+    /// Returns the state of the flexible appendages, and what they add to the craft's moments and
+    /// momenta, for the continuous states `x`.
     pub fn deformed_at<T: Number>(&self, x: &[T; STATES]) -> Deformed<T> {
         self.deformed(&x[index::ETA..], &x[index::ETA_DOT..])
     }
@@ -262,8 +262,9 @@ impl Structure {
         [force, torque]
     }
 
-    /// Subtracts the sum of u u^T over all modes from the craft's mass matrix. A mode with free interface displacement takes
-    /// no part in an acceleration along its participation u = [p; l].
+    /// Subtracts the sum of u u^T over all modes from the craft's mass matrix, where u = [p; l] is
+    /// the participation of a mode. Because a mode is free to deflect, its mass does not follow an
+    /// acceleration of the craft along u.
     pub fn reduce<T: Number>(&self, matrix: &mut Mat6<T>) {
         for (row, effective) in matrix.iter_mut().zip(&self.effective) {
             for (x, effective) in row.iter_mut().zip(effective) {
@@ -291,8 +292,9 @@ impl Structure {
         modes.fold(T::constant(0.0), |sum, (mode, rate)| sum + *rate * *rate * mode.damping)
     }
 
-    /// Returns the largest |eta'| + omega |eta| + |eta''| t of all modes, to which the allowed error of the modes' rates is
-    /// relative.
+    /// Returns an estimate of the largest rate of the modes over the next `t` seconds, |eta'| +
+    /// omega |eta| + |eta''| t, to which the allowed error of the rates is relative. `second` are
+    /// the second derivatives eta''.
     pub fn speed_scale(&self, eta: &[f64], rate: &[f64], second: &[f64], t: f64) -> f64 {
         let states = eta.iter().zip(rate.iter().zip(second));
         self.modes.iter().zip(states).fold(0.0, |most, (mode, (eta, (rate, second)))| {
@@ -348,12 +350,10 @@ pub(crate) struct Flexing {
     momentum: Vector,
     moment: Vector,
     growth: [Symmetric; ORDER + 1],
-    /// Series of the vectors w x y (`turned`) and D w (`grown`) and of the sums K + w x y (`flow`) and L + D w (`spin`); the
-    /// module's head defines the symbols.
-    turned: Vector,
-    grown: Vector,
-    flow: Vector,
-    spin: Vector,
+    turned: Vector, // w x y
+    grown: Vector,  // D w
+    flow: Vector,   // K + w x y
+    spin: Vector,   // L + D w
     pull: [f64; APPENDAGES],
     second: [f64; APPENDAGES],
     /// True while coefficient 1 of the series is a directional derivative instead of a derivative by time.
@@ -491,8 +491,9 @@ impl Flexing {
         [force, torque]
     }
 
-    /// Returns the directional derivatives of w' x y + w x K and of D w' + (sum of D eta') w while w' is constant. The
-    /// module's head defines y, K and D.
+    /// Returns the directional derivatives of two loads of the appendages on the craft while w' is
+    /// constant: w' x y + w x K and D w' + (sum of D eta') w, with the symbols of the module's
+    /// head.
     fn rates_along(&self, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         let [slope, slope_1] =
             [0, 1].map(|n| self.structure.growth(&self.coefficients(&self.rate, n)));
@@ -518,8 +519,8 @@ impl Flexing {
         self.grown[n + 1] = add(self.grown[n + 1], times(&symmetric(self.growth[0]), w));
     }
 
-    /// Returns coefficient n of eta' and eta'' of all modes. If the expansion is along a direction, coefficient 1
-    /// contains the directional derivatives.
+    /// Returns coefficient n of the rates eta' and eta'' of all modes. Coefficient 1 is their
+    /// directional derivative if the expansion is along a direction instead of in time.
     pub fn rates(&self, n: usize) -> [[f64; APPENDAGES]; 2] {
         [self.coefficients(&self.rate, n), self.second]
     }
@@ -531,8 +532,8 @@ impl Flexing {
             .fold(0.0, |sum, (mode, rate)| sum + mode.damping * series::square(n, rate))
     }
 
-    /// Returns the scale to which the allowed error of the modes' rates eta' is relative, estimated over
-    /// the next `t` seconds.
+    /// Returns an estimate of the largest rate eta' of the modes over the next `t` seconds. The
+    /// allowed error of the rates is relative to this estimate.
     pub fn speed_scale(&self, t: f64) -> f64 {
         let [eta, rate, second] = [(&self.eta, 0), (&self.rate, 0), (&self.rate, 1)]
             .map(|(of, n)| self.coefficients(of, n));

@@ -228,8 +228,9 @@ impl Bob {
         self.follows
     }
 
-    /// Returns the unit vector e of the tank's axis and its moment P x e about O, with P the hinge. Their product with
-    /// [a; w'] is the acceleration of the hinge along the axis.
+    /// Returns the unit vector e of the tank's axis, and its moment P x e about the origin O, where
+    /// P is the position of the hinge. The scalar product of these six numbers with the craft's
+    /// accelerations [a; w'] is their contribution to the acceleration of the hinge along the axis.
     pub fn along_axis(&self) -> [Vec3; 2] {
         [self.e, cross(self.hinge, self.e)]
     }
@@ -252,8 +253,8 @@ impl Bob {
         self.dragged[N] = space::scale::<N>(&self.drag.c, &self.p_d);
     }
 
-    /// Sets coefficient N of tension and drag, and coefficient N + 1 of direction and velocity, from coefficient N of
-    /// the accelerations [a; w'].
+    /// Sets coefficient N of the rod's tension and of the drag, and coefficient N + 1 of the bob's
+    /// direction and velocity, from coefficient N of the craft's accelerations [a; w'].
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
@@ -299,8 +300,9 @@ impl Bob {
         [p_d[0], p_d[1], p_d[2], p_dd[0], p_dd[1], p_dd[2]]
     }
 
-    /// Returns the scale, 1/s, to which the allowed error of the bob's velocity v is relative: the
-    /// rate of the swing plus the rate that gravity or centring gives to the angle.
+    /// Returns an estimate of the magnitude of the bob's velocity v, 1/s, to which the allowed
+    /// error of v is relative: the present rate of the bob's direction, plus the natural frequency
+    /// times the sine of the slosh angle.
     #[inline(always)]
     pub fn rate_scale(&self) -> f64 {
         let stiffness = largest(self.specific_force[0]) * self.inv_l + self.k_m;
@@ -308,13 +310,14 @@ impl Bob {
         largest(self.p_d[0]) + libm::sqrt(stiffness) * largest(off_axis)
     }
 
-    /// Returns the time, s, over which the series of the drag converge reliably, from coefficients 0 to 2.
+    /// Estimates the time, s, over which the series of the drag converges reliably, from
+    /// coefficients 0 to 2.
     pub fn convergence_radius(&self) -> f64 {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error, 1/s, of the bob's velocity v at the time `h`, s, after the start of the expansion that arises
-    /// because the series of the drag end at order n.
+    /// Returns the error, 1/s, of the bob's velocity v at the time `h`, s, after the start of the
+    /// expansion. The error arises because the series of the drag end at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -324,14 +327,15 @@ impl Bob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Stores v', the derivative of the bob's velocity, at `h`, s, after the start of the
-    /// expansion, from the series up to order n, for [`Bob::slope_defect`].
+    /// Stores v', the derivative of the bob's velocity v, at `h`, s, after the start of the
+    /// expansion, from the series up to order n. [`Bob::slope_defect`] compares it with v' at the
+    /// start of the next expansion.
     pub fn store_slope(&mut self, n: usize, h: f64) {
         self.slope = space::value(&self.v_d, n - 1, h);
     }
 
-    /// Returns the difference, 1/s^2, between the v' that [`Bob::store_slope`] has stored and v' at
-    /// the start of the present expansion.
+    /// Returns the error of the series at the end of the last expansion, 1/s^2: the derivative v'
+    /// that [`Bob::store_slope`] has stored minus v' at the start of the present expansion.
     pub fn slope_defect(&self) -> f64 {
         largest(sub(self.slope, self.v_d[0]))
     }
@@ -353,8 +357,9 @@ impl Bob {
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// Returns the force of the bob on the craft and its torque about O if the accelerations a and w' are 0. The tension of
-    /// the rod is then T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
+    /// Returns the force of the bob on the craft and its torque about O if the accelerations a and
+    /// w' are 0. The tension of the rod is then T_0 = m (l |v|^2 - p.(w x (w x P))) - k l
+    /// |p_perp|^2 (symbols of the module's head).
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));

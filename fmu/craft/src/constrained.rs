@@ -57,11 +57,8 @@ use crate::parameters::Tank;
 use crate::rigid::{Mat6, add_rank_one, along_rod};
 use crate::surface::{self, Higher, LEAST_INERTIA, Surface};
 
-/// One bob that is guided in a plane or moves on another surface than a sphere: its parameters and the power series of its
-/// motion, in tank axes, with the symbols of the module's head. `tank` and `mode` count from 0. `follows` is true if the
-/// drag coefficient c depends on acceleration or amplitude, so that c and c r' are power series. `across` is b of a planar
-/// mode, `coefficients` are s and kappa, and `highest` is the value of eta at which the model ends, if any. The last fields
-/// are the terms of the current order that do not depend on [a; w'] of this order.
+/// One bob that is guided in a plane or moves on another surface than a sphere: its parameters and
+/// the power series of its motion, in tank axes (symbols of the module's head).
 #[derive(Clone, Debug)]
 pub(crate) struct ConstrainedBob {
     pub tank: usize,
@@ -71,17 +68,17 @@ pub(crate) struct ConstrainedBob {
     inv_l: f64,
     c_m: f64,
     k_m: f64,
-    follows: bool,
+    follows: bool, // true if c depends on acceleration or amplitude
     drag: Drag,
     dragged: Vector,
     p_d: Vector,
     axes: Mat3,
     pub hinge: Vec3,
-    across: Option<Vec3>,
+    across: Option<Vec3>, // b of a planar mode
     surface: Surface,
-    coefficients: [f64; 2],
+    coefficients: [f64; 2], // s and kappa
     higher: Option<Box<HigherSeries>>,
-    highest: Option<f64>,
+    highest: Option<f64>, // eta at which the model ends
     in_tank: Vector,
     w: Pair,
     both: Pair,
@@ -109,13 +106,12 @@ pub(crate) struct ConstrainedBob {
     slope_at_end: Vec3,
 }
 
-/// Power series of the terms beyond the third order and of liquid that spins at the rate W (`liquid`), with the symbols
-/// of the module's head. `known` are the terms of D, P' and tau' of the current order, without those that contain [a;
-/// w'] of this order.
+/// Power series of a bob's terms beyond the third order and of its coupling to spinning liquid
+/// (symbols of the module's head).
 #[derive(Clone, Debug)]
 struct HigherSeries {
     by: Higher,
-    liquid: Series,
+    liquid: Series, // spin rate W
     u3: Series,
     beta: Series,
     turning: Series,
@@ -132,7 +128,7 @@ struct HigherSeries {
     inertia: [f64; 2],
     share: f64,
     m: Vec3,
-    known: [f64; 3],
+    known: [f64; 3], // terms of D, P' and tau' of the current order without [a; w']
 }
 
 impl HigherSeries {
@@ -160,8 +156,8 @@ impl HigherSeries {
         })
     }
 
-    /// Starts an expansion at the displacement q across the tank's axis with the square u; `s` is the value of the
-    /// coefficient S at this displacement.
+    /// Starts an expansion at the bob's displacement `q` across the tank's axis, divided by l, and
+    /// its square `u`. `s` is the value of the coefficient S (module's head) at this displacement.
     fn start(&mut self, q: Vec3, u: f64, s: f64) {
         self.u3[0] = u * u * u;
         let t = self.by.rotary_inertia(u);
@@ -170,8 +166,10 @@ impl HigherSeries {
         self.m = [-q[1], q[0], 0.0];
     }
 
-    /// Computes the terms of order n of the force f from the coefficients of the position r and of u up to order n + 1, and
-    /// from the coefficients of r' and w_e up to order n. Returns the sum of the terms of f that are known at this order.
+    /// Computes coefficient `n` of the terms beyond the third order in the force f (symbols of the
+    /// module's head). `r` and `u` must be known up to order n + 1, `r_d` (the rate r') and `w_e`
+    /// up to order n. Returns the sum of the terms that do not contain the accelerations [a; w'] of
+    /// order n.
     #[inline(never)]
     fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
         let HigherSeries { by, .. } = *self;
@@ -256,14 +254,16 @@ impl HigherSeries {
         self.share * (self.known[2] + dot(self.m, y) + w_e_d * u)
     }
 
-    /// Sets coefficient n of D and P', which the module's head defines. `inner` is S sigma' and `pull` is T tau'
-    /// of the newest order.
+    /// Sets coefficient n of D and P', the factors of q and e x q in the force of the terms beyond
+    /// the third order (symbols of the module's head). `inner` is S sigma' and `pull` is T tau' of
+    /// the newest order.
     fn set(&mut self, n: usize, inner: f64, pull: f64) {
         (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
     }
 
-    /// Returns coefficient n of the vector (u P)' e + u P w x e. Multiplied by -m l^2 it is the torque with which the terms beyond the
-    /// third order act on the craft (see the module's head). `pull` is the part T tau' of order n.
+    /// Returns coefficient n of the vector (u P)' e + u P w x e (symbols of the module's head).
+    /// Multiplied by -m l^2 it is the torque on the craft that the mode's terms beyond the third
+    /// order exert. `pull` is the part T tau' of P' of order n.
     fn couple(&self, n: usize, pull: f64, w: &Vector, u: &Series) -> Vec3 {
         let mut couple = [0.0, 0.0, u[0] * (self.known[1] + pull)];
         for j in 0..n {
@@ -288,8 +288,8 @@ fn dot_from_1(n: usize, a: &Vector, b: &Vector) -> f64 {
     sum[0] + sum[1] + sum[2]
 }
 
-/// Returns coefficient n of the square of the part of `a` that is perpendicular to the tank's axis, the components with the
-/// indices 0 and 1.
+/// Returns coefficient n of the squared length of the part of `a`, in tank axes, that is
+/// perpendicular to the tank's axis.
 fn square_across(n: usize, a: &Vector) -> f64 {
     let mut sum = [0.0; 2];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
@@ -426,8 +426,9 @@ impl ConstrainedBob {
         }
     }
 
-    /// Adds the inertia of the bob, m J^T H J, to the craft's mass matrix. J maps the accelerations [a; w'] to the
-    /// acceleration a + w' x rho of the bob's place, and H is defined in the module's head.
+    /// Adds the inertia of the bob, m J^T H J, to the craft's mass matrix. J maps the accelerations
+    /// [a; w'] to the acceleration a + w' x rho of the bob's place. H takes the place of the
+    /// projection p p^T of a pendulum and is defined in the module's head.
     pub fn add_inertia(&self, matrix: &mut Mat6) {
         let rho = self.place();
         let across = self.across.map(|b| (1.0, b));
@@ -570,8 +571,9 @@ impl ConstrainedBob {
         self.dragged[n] = dragged;
     }
 
-    /// Sets coefficient n of the multipliers and of the force f, and coefficient n + 1 of the velocity V, from
-    /// coefficient n of the craft's accelerations [a; w'].
+    /// Sets coefficient n of the constraint forces (multipliers) and of the force f on the bob's
+    /// surface, and coefficient n + 1 of the bob's velocity V, from coefficient n of the craft's
+    /// accelerations [a; w'].
     #[inline(never)]
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
@@ -666,8 +668,9 @@ impl ConstrainedBob {
         self.drag.set_axial(n, x);
     }
 
-    /// Returns the unit vector e of the tank's axis and its moment P x e about O, with P the hinge. Their product with
-    /// [a; w'] is the acceleration of the hinge along the axis.
+    /// Returns the unit vector e of the tank's axis, and its moment P x e about the origin O, where
+    /// P is the position of the hinge. The scalar product of these six numbers with the craft's
+    /// accelerations [a; w'] is their contribution to the acceleration of the hinge along the axis.
     pub fn along_axis(&self) -> [Vec3; 2] {
         let e = self.axes.map(|row| row[2]);
         [e, cross(self.hinge, e)]
@@ -683,13 +686,14 @@ impl ConstrainedBob {
         largest(self.r_d[0]) + libm::sqrt(stiffness) * f64::max(x.abs(), y.abs())
     }
 
-    /// Returns the time, s, over which the series of the drag converge reliably, from coefficients 0 to 2.
+    /// Estimates the time, s, over which the series of the drag converges reliably, from
+    /// coefficients 0 to 2.
     pub fn convergence_radius(&self) -> f64 {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error, 1/s, of the bob's velocity V at the time `h`, s, after the start of the expansion that arises
-    /// because the series of the drag end at order n.
+    /// Returns the error, 1/s, of the bob's velocity V at the time `h`, s, after the start of the
+    /// expansion. The error arises because the series of the drag end at order n.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -700,15 +704,17 @@ impl ConstrainedBob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Stores V', the derivative of the bob's velocity, at `h`, s, after the start of the
-    /// expansion, from the series up to order n, for [`ConstrainedBob::slope_defect`].
+    /// Stores V', the derivative of the bob's velocity V, at `h`, s, after the start of the
+    /// expansion, from the series up to order n. [`ConstrainedBob::slope_defect`] compares it with
+    /// V' at the start of the next expansion.
     pub fn store_slope(&mut self, n: usize, h: f64) {
         let horner = |sum: Vec3, k: usize| add(scale(h, sum), scale(k as f64, self.v[k]));
         self.slope_at_end = (1..=n).rev().fold([0.0; 3], horner);
     }
 
-    /// Returns the difference, 1/s^2, between the V' that [`ConstrainedBob::store_slope`] has
-    /// stored and V' at the start of the present expansion.
+    /// Returns the error of the series at the end of the last expansion, 1/s^2: the derivative V'
+    /// that [`ConstrainedBob::store_slope`] has stored minus V' at the start of the present
+    /// expansion.
     pub fn slope_defect(&self) -> f64 {
         largest(sub(self.slope_at_end, self.v[1]))
     }
@@ -717,9 +723,10 @@ impl ConstrainedBob {
         largest(self.v[n])
     }
 
-    /// Updates the rate r' of the bob for an impulse that changes the velocity of O by `dv` and the angular velocity
-    /// by `dw`, both in body axes: l r' changes by -(1 - H)(dv + dw x rho). `x` has the bob's six states at the
-    /// start of the expansion.
+    /// Updates the rate r' of the bob after an impulse that changes the velocity of O by `dv` and
+    /// the angular velocity by `dw`, both in body axes. The product l r' changes by -(1 - H)(dv +
+    /// dw x rho), with the matrix H of the module's head. `x` has the bob's six states at the start
+    /// of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
         let mut change = scale(-self.inv_l, sub(kick, self.held(kick)));

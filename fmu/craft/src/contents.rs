@@ -77,9 +77,7 @@ use crate::state::Line;
 use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
 use crate::table::{FillCurves, Filling, Jet};
 
-/// A tank in its mounting position, with the quantities that do not change during a run. If the tank does not drain, `still`
-/// contains two rigid bodies: the rigid liquid, and all liquid at rest. If the fill table contains the coefficients of the
-/// modes' surfaces, `surfaces` are the surfaces at the start of the run.
+/// A tank in its mounting position, with the quantities that do not change during a run.
 #[derive(Clone, Debug)]
 pub struct MountedTank {
     pub tank: Tank,
@@ -90,10 +88,10 @@ pub struct MountedTank {
     planar: bool,
     across: [Option<Vec3>; MODES],
     curved: bool,
-    surfaces: [Option<Surface>; MODES],
+    surfaces: [Option<Surface>; MODES], // at the start of the run
     laws: [Law; MODES],
     spin: Option<Spin>,
-    still: Option<[Rigid; 2]>,
+    still: Option<[Rigid; 2]>, // rigid liquid, and all liquid at rest; `None` if the tank drains
 }
 
 /// Returns the constant `x` as a [`Jet`], whose derivatives are 0.
@@ -101,10 +99,8 @@ fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
 
-/// A bob with the terms of its equation of motion that do not contain [a; w']: `u` is [p; P x p], `phi` is the force phi of the
-/// module's head, `known` is G without a + w' x rho, and `centring` is the energy of the centring stiffness. Three fields are 0
-/// unless the tank drains: `m_d` is m', `end_rate` is h' e + l' p, the velocity of the bob if the direction p is constant, and
-/// `centring_d` is k l l' |p_perp|^2.
+/// A bob with the terms of its equation of motion that do not contain the accelerations [a; w']
+/// (symbols of the module's head).
 pub struct Swing<T> {
     m: T,
     l: T,
@@ -112,14 +108,14 @@ pub struct Swing<T> {
     p_d: Vec3<T>,
     rho: Vec3<T>,
     rho_d: Vec3<T>,
-    u: [T; 6],
+    u: [T; 6], // [p; P x p]
     t_0: T,
     phi: Vec3<T>,
-    known: Vec3<T>,
-    centring: T,
-    m_d: T,
-    end_rate: Vec3<T>,
-    centring_d: T,
+    known: Vec3<T>,    // G without a + w' x rho
+    centring: T,       // energy of the centring stiffness
+    m_d: T,            // m'
+    end_rate: Vec3<T>, // h' e + l' p, the velocity of the bob for a constant p
+    centring_d: T,     // k l l' |p_perp|^2
     surface: Option<OnSurface<T>>,
 }
 
@@ -131,17 +127,16 @@ struct OnSurface<T> {
     rotary: Option<Rotary<T>>,
 }
 
-/// Contents of a tank at an instant. The flow within the tank and the spin of the liquid have the momenta K and L
-/// (`flow_momentum`) and act on the craft with the force and torque `flow_wrench` about O. `dissipation` is in W.
-/// `shrinking` contains m_0', S_0' and I_0' w of the rigid liquid.
+/// Contents of a tank at an instant, and their loads on the craft.
 pub struct Contents<'a, T> {
     mounted: &'a MountedTank,
     pub rigid: Rigid<T>,
+    // Force and torque about O by the flow within the tank and by the spin
     flow_wrench: [Vec3<T>; 2],
-    pub flow_momentum: [Vec3<T>; 2],
+    pub flow_momentum: [Vec3<T>; 2], // K and L of the flow within the tank and of the spin
     bobs: [Option<Swing<T>>; MODES],
-    pub dissipation: T,
-    shrinking: (T, [Vec3<T>; 2]),
+    pub dissipation: T,           // W
+    shrinking: (T, [Vec3<T>; 2]), // m_0', S_0' and I_0' w of the rigid liquid
     spin: Option<SpinNow<T>>,
 }
 
@@ -203,8 +198,9 @@ impl MountedTank {
         self.drains().then(|| self.curves.filling(self.tank.modes, liquid))
     }
 
-    /// Returns the liquid at rest as a rigid body. For a tank with a fill table, `liquid` is the mass of the liquid, kg, and
-    /// `filling` is [`MountedTank::filling`] of this mass; for other tanks neither has an effect.
+    /// Returns the liquid at rest as a rigid body. In a tank with a fill table, `liquid` is the
+    /// mass of the liquid, kg, and `filling` is the result of [`MountedTank::filling`] for this
+    /// mass. In other tanks neither argument has an effect.
     pub fn at_rest<T: Number>(&self, liquid: T, filling: Option<&Filling<T>>) -> Rigid<T> {
         let tank = &self.tank;
         if let Some(whole) = self.rigid_at_rest() {
@@ -245,9 +241,10 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// Returns the surface on which the bob of mode `n` moves (`n` counts from 0), and the height of the bob. `l` is the
-    /// length with its derivatives, `turning` is the liquid's rate of spin with its derivative, and `changing` are the
-    /// large-wave coefficients s and kappa with their derivatives if the fill table contains them.
+    /// Returns the height of the bob of mode `n` and the surface on which it moves. `n` counts from
+    /// 0. `l` is the pendulum length with its derivatives, and `turning` is the liquid's rate of
+    /// spin with its derivative. `changing` are the coefficients s and kappa with their
+    /// derivatives, if the fill table contains them.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
@@ -284,8 +281,9 @@ impl MountedTank {
         contents
     }
 
-    /// Returns the spinning liquid at the angular momentum `l` and with direction p and rate p' of each mode, `x`, both in
-    /// tank axes, while the craft rotates with `w`, body axes. `None` if the liquid has no spin.
+    /// Returns the motion of the tank's spinning liquid; `None` if the liquid has no spin. `l` is
+    /// the angular momentum of the spin, and `x` has direction p and rate p' of each mode, both in
+    /// tank axes. `w` is the angular velocity of the craft, body axes.
     pub fn spin_now<T: Number>(&self, x: &[T], l: Vec3<T>, w: Vec3<T>) -> Option<SpinNow<T>> {
         let spin = self.spin.as_ref()?;
         let mut reaction = T::constant(0.0);
@@ -350,7 +348,8 @@ impl MountedTank {
         bobs
     }
 
-    /// Projects direction and rate of the bobs of planar modes into their planes; `x` is as in [`MountedTank::contents`].
+    /// Projects the direction and the rate of each bob of a planar mode into the plane of this
+    /// mode. `x` has six numbers for each bob, tank axes.
     pub fn flatten(&self, x: &mut [f64]) {
         for n in 0..self.tank.modes {
             let Some(b) = self.tank.plane_normal(n) else { continue };
@@ -361,8 +360,9 @@ impl MountedTank {
         }
     }
 
-    /// Returns true if a bob is at an angle at which its inertia is too small for the model. `x` and `liquid`
-    /// are as in [`MountedTank::contents`].
+    /// Returns true if the slosh angle of a mode is so large that its bob has too little inertia
+    /// for the model. `x` has direction and rate of each bob, tank axes, and `liquid` is the mass
+    /// of liquid, kg.
     #[inline(never)]
     pub fn is_beyond(&self, x: &[f64], liquid: f64) -> bool {
         (0..MODES).any(|n| self.least_inertia(n, x, liquid) < LEAST_INERTIA)
@@ -381,9 +381,10 @@ impl MountedTank {
         surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
-    /// Returns an error if a bob is at an angle at which its inertia along the meridian is too small for the model. `tank` is the
-    /// tank's number for the message; it counts from 1, and is 0 if the system has only one tank. The check has a tolerance of
-    /// 1e-6, because a step that would pass the limit is ended just before it.
+    /// Returns an error if the slosh angle of a mode is so large that the bob has too little
+    /// inertia along the meridian of its surface. `tank` is the tank's number in the message; it
+    /// counts from 1, and is 0 if the system has only one tank. The check has a tolerance of 1e-6,
+    /// because a step that would pass the limit is ended just before it.
     pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
         let is_near = |n: &usize| self.least_inertia(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
@@ -429,7 +430,8 @@ impl<T: Number> Swing<T> {
         }
     }
 
-    /// Returns the force of the bob on the craft, as in [`Swing::wrench`].
+    /// Returns the force of the bob on the craft for the accelerations [a; w'], without the force
+    /// that guides a planar mode in its plane.
     fn pull(&self, a: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
         if self.surface.is_some() {
             return self.wrench(a, w_d)[0];
@@ -459,8 +461,8 @@ impl<T: Number> OnSurface<T> {
         self.meridian.free(force)
     }
 
-    /// Returns the torque of rotary motion on the craft about the tank's axis, divided by the mass of the bob; `slid` is the
-    /// vector -l y (`surface.rs`).
+    /// Returns the torque that the mode's rotary motion exerts on the craft about the tank's axis,
+    /// divided by the bob's mass. `slid` is the vector -l y with the symbols of `surface.rs`.
     fn couple(&self, slid: Vec3<T>, w_d: Vec3<T>) -> Option<Vec3<T>> {
         let (rotary, n) = (self.rotary.as_ref()?, self.meridian.around()?);
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
@@ -720,8 +722,8 @@ impl<T: Number> Contents<'_, T> {
         self.spin.as_ref().map(|now| (now.rate, [now.energy, now.turning[0]]))
     }
 
-    /// Returns the force of the liquid on the craft and its torque about O if a = w' = 0, without the inertial forces
-    /// of the rigid liquid.
+    /// Returns the force of the liquid on the craft and its torque about O for the accelerations a
+    /// = 0 and w' = 0. The inertial forces of the rigid liquid are left out.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(Swing::load);
         let sum =
@@ -842,11 +844,12 @@ pub trait Drains<const D: usize>: System<D> + Sized {
 
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;
 
-    /// Returns an error if a bob is beyond the largest slosh angle of its surface.
+    /// Returns an error if a slosh angle is too large for the model of its mode.
     fn check_surfaces(&self, x: &[f64; D]) -> Result<(), StepError>;
 
-    /// Advances the states by `h`. `begin` is the simulation time at the start, s, for messages. Where the mass of liquid passes
-    /// a point of a fill table the derivatives jump; therefore an internal step of the solver ends there.
+    /// Advances the states `x` by `h`, s. `begin` is the simulation time at the start, s, for
+    /// messages. An internal step of the solver ends where the mass of liquid passes a point of a
+    /// fill table, because the derivatives jump there.
     fn advance(
         &self,
         x: &mut [f64; D],

@@ -69,7 +69,7 @@ impl Breaking {
 /// Largest step of the solver as a fraction of the estimated radius of convergence of a power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// Power series of the damping by breaking waves, w f(k a), and of the products in it.
+/// Power series of the additional damping by breaking waves, w f(k a).
 #[derive(Clone, Debug)]
 struct Excess {
     law: Breaking,
@@ -109,8 +109,9 @@ impl Excess {
         0.5 * (self.steep[n] + mul(n, &self.steep, &self.quotient))
     }
 
-    /// Estimates the time, s, over which the series of the damping by breaking waves converges, from its coefficients 0
-    /// to 2. The series has a singularity where w d = +-i w delta (see the module's head).
+    /// Estimates the time, s, over which the series of the damping by breaking waves converges,
+    /// from its coefficients 0 to 2. The series has a singularity where d, the steepness minus s_b,
+    /// is +-i delta (symbols of the module's head).
     fn convergence_radius(&self) -> f64 {
         let Excess { root, above, w, .. } = self;
         let [slope, bend] = [1, 2].map(|n| above[n].abs() + CORNER * w[n].abs());
@@ -118,18 +119,17 @@ impl Excess {
     }
 }
 
-/// Drag of one mode in a tank that does not drain, with the power series of c. `growth` is 2 m zeta_A, kg/rad; `c_ref` is c at
-/// g_ref without the terms that depend on the amplitude, N s/m; `w2_ref` is w_ref^2 and `floor2` is a_f^2. `instant` computes c
-/// directly from values at one instant, so that the error of the series can be found by comparison.
+/// Drag of one mode in a tank that does not drain, with the power series of the drag coefficient c
+/// (symbols of the module's head).
 #[derive(Clone, Debug)]
 pub struct Drag {
     law: DampingLaw,
-    growth: f64,
-    c_ref: f64,
+    growth: f64, // 2 m zeta_A, kg/rad
+    c_ref: f64,  // c at g_ref without the terms that depend on the amplitude, N s/m
     inv_l: f64,
     k_m: f64,
-    w2_ref: f64,
-    floor2: f64,
+    w2_ref: f64, // w_ref^2
+    floor2: f64, // a_f^2
     x: Series,
     root: Series,
     divisor: Series,
@@ -140,7 +140,7 @@ pub struct Drag {
     tilt2: Series,
     speed2: Series,
     speed: Series,
-    instant: (Law, [f64; 2]),
+    instant: (Law, [f64; 2]), // computes c directly, to find the error of the series
     excess: Option<Excess>,
     twice_m: f64,
     grows: bool,
@@ -226,12 +226,13 @@ impl Drag {
         self.c[n]
     }
 
-    /// Estimates the time, s, over which the series of the drag coefficient c converge reliably, from their
-    /// coefficients 0 to 2.
+    /// Estimates the time, s, over which the series of the drag coefficient c converges reliably,
+    /// from coefficients 0 to 2 of the quantities on which c depends.
     ///
-    /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that crosses zero passes
-    /// close to x = +-i a_f. Before and after the crossing a_+ is almost linear in x, or almost 0, so that its coefficients
-    /// do not show the singularity.
+    /// The square roots in a_+ and in A (symbols of the module's head) have singularities at the
+    /// imaginary values x = i a_f and x = -i a_f, and where w^2 A^2 = 0. Thrust that crosses zero
+    /// passes close to the first of these points. Before and after the crossing a_+ is almost
+    /// linear in x, or almost 0, so that its coefficients do not show the singularity.
     pub fn convergence_radius(&self) -> f64 {
         let [_, slope, bend] = [0, 1, 2].map(|n| self.x[n].abs());
         let mut time = time_within(self.root[0], slope, bend);

@@ -258,8 +258,9 @@ impl Draining {
         })
     }
 
-    /// Returns an error if a mass of liquid is outside its fill table, a bob is beyond the largest angle of its surface, or
-    /// the deflection of an appendage is beyond its linear model.
+    /// Returns an error if a state is outside the range for which the model is valid: a tank's mass
+    /// of liquid is outside its fill table, a slosh angle is too large for its mode, or an
+    /// appendage is deflected too far for its linear model.
     pub fn check(&self, x: &[f64; STATES]) -> Result<(), StepError> {
         self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))?;
         self.check_surfaces(x)
@@ -318,9 +319,10 @@ impl Draining {
         true
     }
 
-    /// Completes the energy balance after an impulse of the wheels has changed the state from `before` to `state`. If liquid
-    /// flows, the ends of the rods move and the impulse also does work on them, as the tension T does in drained'
-    /// (`contents.rs`). This work is added to the drained energy.
+    /// Completes the energy balance after a jump of the wheels' momentum has changed the state from
+    /// `before` to `state`. If liquid flows out of a tank, the hinges and lengths of its pendulums
+    /// change, so that the impulse does work on the ends of the rods. This work is added to the
+    /// drained energy.
     pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
         if state.flow != [0.0; TANKS] {
             let work = state.x[index::WORK] - before.x[index::WORK];
@@ -370,8 +372,9 @@ impl Draining {
         })
     }
 
-    /// Returns the accelerations [a; w'] that craft and liquids at rest would have as one rigid body. If no drag depends on the
-    /// acceleration (`damping.rs`), returns 0.
+    /// Returns the accelerations [a; w'] that the craft would have if craft and liquids at rest
+    /// were one rigid body; the drag depends on them. Returns 0 if no drag depends on the
+    /// acceleration (`damping.rs`).
     fn rigid_motion<T: Number>(
         &self,
         x: &[T; STATES],

@@ -80,8 +80,9 @@ pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 const LARGEST_COEFFICIENT: f64 = 1e75;
 const TOUCHING: f64 = 1e-10;
 const RESTING: f64 = 1e-9;
-/// Smallest value of f'' (f is the function that describes the wall), relative to the terms of its sum, at which detached
-/// liquid on the wall counts as pressed to it. Smaller values may be rounding errors.
+/// Detached liquid on the wall counts as pressed to the wall if the second derivative of f, the
+/// function that describes the wall, exceeds this fraction of the terms of its sum. Smaller values
+/// may be rounding errors.
 const PRESSING: f64 = 1e-9;
 /// Distance in time, relative to the time of an event, between the two points from which the slope of the event's function is
 /// computed.
@@ -105,26 +106,21 @@ pub(crate) enum Due {
     Look,
 }
 
-/// Function that crosses zero at an event. `Exact` stands for the wall force and the bobs' mean cosine, whose series are as exact
-/// as the series of the motion. `Axial` is the specific force along the axis minus its lower limit, `Passage` is half of the
-/// derivative of the squared distance from the axis, and `Excess` is the wall force minus the force above which drag acts.
+/// Kind of a function of time that crosses zero at an event of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Crossing {
-    Exact,
+    Exact, // wall force or mean cosine of the bobs, whose series are as exact as the motion's
     Contact,
-    Axial,
-    Passage,
-    Excess,
+    Axial,   // specific force along the axis minus its lower limit
+    Passage, // half of the derivative of the squared distance from the axis
+    Excess,  // wall force minus the force above which drag acts
     Settling(usize),
 }
 
 pub(crate) type Directions = [Vec3; MODES];
 
-/// The detached liquid of one tank and the power series of its motion, body axes, with the symbols of the module's head.
-/// `drag` is d, 1/s. `axes` rotates from tank axes to body axes. The surface that the liquid's centre can reach has its own
-/// centre at `height` on the tank's axis and the semi-axes `half` along the axis and `across`. `gyration` is R_p. `shares`
-/// are the modes' shares of the modal mass, and l_s is the length whose inverse is the mean of 1/l weighted by these shares.
-/// The liquid leaves the bottom if the specific force along the axis is below `lowest`, and returns above `floor`, m/s2.
+/// The detached liquid of one tank and the power series of its motion, body axes (symbols of the
+/// module's head).
 #[derive(Clone, Debug)]
 pub(crate) struct Lump {
     pub tank: usize,
@@ -133,19 +129,19 @@ pub(crate) struct Lump {
     pub m: f64,
     restitution: f64,
     contact_speed: f64,
-    drag: f64,
-    axes: Mat3,
+    drag: f64,  // d, 1/s
+    axes: Mat3, // from tank axes to body axes
     e: Vec3,
     origin: Vec3,
-    height: f64,
+    height: f64, // of the centre of the surface that the liquid can reach
     center: Vec3,
-    half: f64,
-    radius: f64,
+    half: f64,   // semi-axis of this surface along the axis
+    radius: f64, // semi-axis of this surface across the axis
     d: Mat3,
-    gyration: f64,
+    gyration: f64, // R_p
     hinge: Vec3,
-    shares: [f64; MODES],
-    swing_length: f64,
+    shares: [f64; MODES], // of the modes in the modal mass
+    swing_length: f64,    // l_s
     pub rigid: Rigid,
     m_0: f64,
     s: Vec3,
@@ -154,8 +150,8 @@ pub(crate) struct Lump {
     masses: [f64; MODES],
     lengths: [f64; MODES],
     hinges: [Vec3; MODES],
-    lowest: f64,
-    floor: f64,
+    lowest: f64, // specific force along the axis below which the liquid leaves the bottom
+    floor: f64,  // specific force along the axis above which it returns
 
     x_0: Vec3,
     rho: Vector,
@@ -169,7 +165,8 @@ pub(crate) struct Lump {
     sum: Vector,
     turned: Vector,
     u_turned: Vec3,
-    /// Derivative of the shape's inertia J_a in a directional derivative, kg m2, body axes; 0 if the expansion is in time.
+    /// Directional derivative of J_a, the inertia of the liquid about its centre, kg m2, body axes;
+    /// 0 if the expansion is in time.
     pub shape_slope: Mat3,
     known_pull: f64,
     known_force: Vec3,
@@ -315,8 +312,8 @@ impl Lump {
         Rigid { mass: 0.0, moment: [0.0; 3], inertia }
     }
 
-    /// Sets the derivative of the inertia J_a in [`Lump::shape`] for a change of the directions `p` by `dp`. The velocity of
-    /// the liquid's centre has no effect, because the first moment about the centre is 0.
+    /// Sets the directional derivative of J_a, the inertia of the detached liquid about its centre,
+    /// for a change of the directions `p` of the bobs by `dp`.
     pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
         let center = self.common_center(p);
         let mut slope = [[0.0; 3]; 3];
@@ -524,8 +521,9 @@ impl Lump {
         [force, cross(rho, force)]
     }
 
-    /// Returns the added mass of sliding liquid, (m/G.G) u u^T, as the factor m/G.G and the vector u = [G; rho x G], where G
-    /// is the gradient of the function f that describes the wall. `None` if the liquid does not slide.
+    /// Returns the added mass of sliding liquid, (m/G.G) u u^T, as the factor m/G.G and the vector
+    /// u = [G; rho x G]. G is the gradient of the function f that describes the wall, and rho is
+    /// the liquid's position from O. Returns `None` if the liquid does not slide.
     pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
         let (g, squared) = self.gradient::<T>();
         let along = || along_rod(g, Self::value_and_slope::<T>(&self.rho));
@@ -593,9 +591,10 @@ impl Lump {
         [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
     }
 
-    /// Returns the impulse on the craft at a hand-over to the pendulums, when the tank catches rigid liquid and bobs, and
-    /// the rates p' of the bobs after it. Before the hand-over all parts move with `rate` relative to the tank; `p` are the
-    /// directions of the rods.
+    /// Computes the hand-over of detached liquid to rigid liquid and pendulums, in which the tank
+    /// catches the liquid. Before it, all parts of the liquid move with the velocity `rate`
+    /// relative to the tank; `p` are the directions of the rods. Returns the impulse on the craft
+    /// with its moment about O, and the rates p' of the bobs afterwards.
     pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
         let mut impulse = scale(self.m_0, rate);
         let mut torque = cross(self.s, impulse);
@@ -669,8 +668,9 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// Returns the next event of the liquid and its time within `h`, s, after the start of the expansion, from the series up
-    /// to order n. `bobs` are the bobs of the tank.
+    /// Returns the next event of the liquid and its time within `h`, s, after the start of the
+    /// expansion, from the series up to order n. `motion` has the series of the craft's a, w and
+    /// w', and `bobs` are the bobs of the tank.
     pub fn next<'a>(
         &self,
         n: usize,
@@ -796,8 +796,8 @@ impl Lump {
         }
     }
 
-    /// Returns the coefficients up to n of the mean cosine of the bobs' angles from the axis, by modal mass,
-    /// minus cos 45 degrees.
+    /// Returns the power series, up to order n, of the mean cosine of the bobs' angles from the
+    /// tank's axis minus cos 45 degrees. The mean is weighted by the modal masses.
     fn upright<'a>(&self, bobs: impl Iterator<Item = &'a Bob>, n: usize) -> Series {
         let mut upright = ZERO;
         for bob in bobs {
@@ -881,8 +881,8 @@ impl Lump {
         add(self.center, scale(1.0 / size, self.x_0))
     }
 
-    /// Returns the coefficients of orders below n of the squared wall force minus the square of twice the drag force. This
-    /// difference rises through zero where drag begins to act.
+    /// Returns the coefficients of orders below n of a function that rises through zero where drag
+    /// begins to act: the squared wall force minus the square of twice the drag force.
     fn excess(&self, n: usize) -> Series {
         let (mut pull, mut excess) = (ZERO, ZERO);
         for (k, x) in pull.iter_mut().enumerate().take(n) {
@@ -1062,8 +1062,9 @@ mod tests {
         assert_eq!(lump.excess(3)[1], 36.0 - 36.0);
     }
 
-    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s, so the liquid is released. It is nearest to the axis
-    /// after 0.25 s or 0.75 s.
+    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s, when the liquid leaves the
+    /// wall. The liquid is nearest to the tank's axis, where the pendulums may take it over, after
+    /// 0.25 s in the first case and 0.75 s in the second.
     #[test]
     fn the_earlier_of_release_and_settling_is_the_next_event() {
         let mut lump = lump(BallState::Held);

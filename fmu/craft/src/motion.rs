@@ -66,8 +66,8 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::spin::SpinSeries;
 use crate::state::{BallState, Inputs, Kept, STATES, State, index};
 
-/// Longest time, s, over which the change of rates is included in the scales of allowed errors. The rates could change by more
-/// only in steps that are much longer.
+/// Longest time, s, for which the change of the rates is added to the magnitudes to which allowed
+/// errors are relative. Only much longer steps could change the rates by more.
 pub const SCALE_TIME: f64 = 0.1;
 
 /// Returns coefficient n of the matrix w w^T - |w|^2 1, which maps a vector y to w x (w x y). The argument is coefficient n
@@ -101,19 +101,16 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// The place that holds the states at the start of the expansion. A step copies these states only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
-    /// The states are in `state.kept`, because the step continues the expansion of an earlier step.
+    /// The step continues the expansion of an earlier step. The states at its start are in
+    /// `state.kept`.
     Kept,
-    /// The states are in `before`, because the expansion starts together with the step.
+    /// The expansion starts together with the step. The states at its start are in `before`.
     Step,
-    /// The states are in `begin`, because the expansion starts within the step.
+    /// The expansion starts within the step. The states at its start are in `begin`.
     Within,
 }
 
-/// State of the craft and the power series of its motion. `craft` is the dry craft. `parked` are the bobs of tanks whose liquid
-/// has detached. `whole` is one rigid body of craft and liquids at rest, whose acceleration along the tanks determines the drag
-/// of the bobs. `matrix` is M, `w_both` is the pair (w, w), and `torque` is tau - h_w'. `couple` is the torque of pivot and
-/// spinning liquids, and `loss_of_couple` the power that it dissipates. The fields with `allowed` are the inverses of the allowed
-/// errors of attitude, angular velocity, bobs' v, velocity, lumps' u, appendages' rates, and spins' I^-1 L.
+/// State of a craft and the power series of its motion.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
     pub state: State,
@@ -126,34 +123,35 @@ pub struct CraftMotion {
     upright: Vector,
     spins: Vec<SpinSeries>,
     has_couples: bool,
-    couple: Vec3,
-    loss_of_couple: f64,
-    pub craft: Rigid,
+    couple: Vec3,        // torque of pivot and spinning liquids
+    loss_of_couple: f64, // power that `couple` dissipates
+    pub craft: Rigid,    // dry craft
     pub rigid: Rigid,
     mass_matrix: Mat6,
     pub liquids: Vec<Rigid>,
     pub bobs: Vec<Bob>,
     constrained: Vec<ConstrainedBob>,
-    parked: Vec<Bob>,
+    parked: Vec<Bob>, // bobs of tanks whose liquid has detached
     pub lumps: Vec<Lump>,
     flexing: Option<Box<Flexing>>,
     any_apart: bool,
     has_events: bool,
-    /// Index of the constrained bob that reaches the largest angle of its surface at the end of the expansion, if any.
+    /// Index of the constrained bob, if any, whose slosh angle reaches the limit of its mode at the
+    /// end of the expansion.
     beyond: Option<usize>,
     /// Number of the detached liquid that has an event at the end of the expansion, and this event, if any.
     due: Option<(usize, Due)>,
     follows: bool,
-    whole: Rigid,
+    whole: Rigid, // craft and liquids at rest as one rigid body, for the drag
     along: Vec<[Vec3; 2]>,
-    matrix: Mat6,
+    matrix: Mat6, // M
     factors: Factors,
     force: [Vec3; 2],
-    torque: [Vec3; 2],
+    torque: [Vec3; 2], // tau - h_w'
     pub h: [Vec3; 2],
     pub q: Attitude,
     pub w: Vector,
-    w_both: Pair,
+    w_both: Pair, // (w, w)
     pub w_d: Vector,
     pub a: Vector,
     gain: Vector,
@@ -162,21 +160,24 @@ pub struct CraftMotion {
     speed: Vector,
     pub work: Series,
     pub dissipation: Series,
-    inv_allowed: [f64; 4],
-    lumps_allowed: f64,
-    flexing_allowed: f64,
-    spins_allowed: f64,
+    inv_allowed: [f64; 4], // 1/allowed errors of attitude, angular velocity, bobs' v, and velocity
+    lumps_allowed: f64,    // 1/allowed error of the lumps' u
+    flexing_allowed: f64,  // 1/allowed error of the appendages' rates
+    spins_allowed: f64,    // 1/allowed error of the spins' I^-1 L
     longest: f64,
     expansion: Expansion,
     start: Start,
-    /// Number of the first states that include all states which a step may change. Only these states are copied, because a
-    /// small craft has constants in three quarters of the places.
+    /// Number of states, counted from the first, that include all states which a step may change.
+    /// Only these states are copied, because three quarters of the states of a small craft are not
+    /// in use.
     pub changing: usize,
     /// Continuous states at the start of the step, of which only the first [`CraftMotion::changing`] are valid.
     pub before: [f64; STATES],
-    /// The same states at the start of the expansion if it starts within a step ([`Start::Within`]).
+    /// States at the start of the expansion if it starts within a step ([`Start::Within`]). Only
+    /// the first `changing` states are valid.
     begin: [f64; STATES],
-    /// Derivatives of w and V at the end of the expansion, body axes.
+    /// Derivatives of the angular velocity w and of the velocity V of O at the end of the
+    /// expansion, body axes.
     slopes: [Vec3; 2],
 }
 
@@ -351,9 +352,11 @@ impl CraftMotion {
         self.factors.solve([force, torque])
     }
 
-    /// Sets the angular momentum of the wheels to `h`. If it differs from the present momentum by dh, the craft receives an
-    /// impulse: velocity and angular velocity change by [dV; dw] = M^-1 [0; -dh], the direction p of each bob by l dp' =
-    /// -(1 - p p^T)(dV + dw x rho), and the wheels do the work -dh.(w + dw/2). Returns true if the momentum jumps.
+    /// Sets the angular momentum of the wheels to `h`. Returns true if it jumps.
+    ///
+    /// A jump by dh is an impulse on the craft. With the mass matrix M, the velocity and the
+    /// angular velocity change by [dV; dw] = M^-1 [0; -dh]. The rate p' of each bob's direction p
+    /// changes by l dp' = -(1 - p p^T)(dV + dw x rho). The wheels do the work -dh.(w + dw/2).
     pub fn set_wheels(&mut self, h: Vec3) -> bool {
         if h == self.state.h_wheels {
             return false;
@@ -403,8 +406,9 @@ impl CraftMotion {
         self.evaluate_at(0.0);
     }
 
-    /// Computes coefficients 0 and 1 of every quantity, where coefficient 1 is the derivative for a change of the states by
-    /// dx and of the inputs by du.
+    /// Computes coefficients 0 and 1 of every quantity. Coefficient 1 is here the directional
+    /// derivative for a change of the states by `dx` and of the inputs by `df` (force), `dtau`
+    /// (torque) and `dh` (momentum of the wheels).
     pub fn evaluate_direction(
         &mut self,
         inputs: &Inputs,
@@ -484,9 +488,9 @@ impl CraftMotion {
         self.expansion.clear();
     }
 
-    /// Advances the states by `h` > 0, s. If the inputs have jumped (`has_jumped`), the step starts from the present
-    /// states, otherwise from the states in `before`. If an error is returned, the states are invalid, and the expansion
-    /// in `state.kept` is unchanged.
+    /// Advances the states by `h` > 0, s. If the inputs have jumped (`has_jumped`), the step starts
+    /// from the present states, otherwise from the states in the field `before`. If an error is
+    /// returned, the states are invalid, and the expansion in `state.kept` is unchanged.
     // The preparation of a step is a function of its own, because both take more instructions if they are compiled together.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
@@ -1033,8 +1037,8 @@ impl CraftMotion {
             .fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
-    /// Updates the craft after the liquid of a tank has detached or settled, without allocating: rigid liquids and bobs of tanks
-    /// with settled liquid belong to the craft, those of tanks with detached liquid do not.
+    /// Updates the craft, without allocating, after the liquid of a tank has detached or settled.
+    /// Rigid liquid and bobs of a tank are parts of the craft only while the liquid is settled.
     fn arrange(&mut self) {
         let mut changed = false;
         for lump in &mut self.lumps {
@@ -1074,11 +1078,14 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Advances the states of constrained bobs, detached liquids and appendages by `h`, s. Returns true if the new states
-    /// are finite and not too large.
+    /// Advances the states of constrained bobs, detached liquids and appendages to the time `h`, s,
+    /// after the start of the expansion, by their series up to order `n`. `w` is the angular
+    /// velocity at that time. Returns true if the new states are finite and not too large.
     ///
     /// # Errors
-    /// If a bob has reached the largest angle of its surface, or the deflection of an appendage is beyond its linear model.
+    ///
+    /// If a slosh angle or the deflection of an appendage has reached the limit for which its mode
+    /// is valid.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -1117,8 +1124,9 @@ impl CraftMotion {
         self.flexing.as_ref().map(|flexing| flexing.now())
     }
 
-    /// Returns the time, s, of the first event within `h`: an event of detached liquid, or a constrained bob reaches the
-    /// largest angle of its surface.
+    /// Returns the time, s, of the first event within `h`: an event of detached liquid, or a slosh
+    /// angle that reaches the limit for which its mode is valid. Returns `None` if there is no
+    /// event.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_lumps(n, h);
@@ -1148,8 +1156,9 @@ impl CraftMotion {
         first
     }
 
-    /// Performs all events of detached liquid that are due now (Model Exchange). Returns true if there were events, and `None` if
-    /// states are so large that products of their series could overflow.
+    /// Performs all events of detached liquid that are due now (Model Exchange). Returns true if
+    /// there were events. Returns `None` if states are so large that the power series could
+    /// overflow.
     pub fn take_due(&mut self, inputs: &Inputs) -> Option<bool> {
         self.inputs = *inputs;
         let mut any = false;

@@ -126,7 +126,8 @@ impl TankOutputs {
         self.set_wave(bobs.map(|bob| (bob.borrow().in_tank, bob.borrow().wave)));
     }
 
-    /// Sets the slosh angles and the height of the wave from p (tank axes) and the wave height per slosh angle, m, of each mode.
+    /// Sets the slosh angles and the height of the wave. `modes` yields for each mode the bob's
+    /// direction p, tank axes, and the wave height per slosh angle, m.
     pub(crate) fn set_wave<T: Number>(&mut self, modes: impl Iterator<Item = (Vec3<T>, f64)>) {
         let mut wave = [T::constant(0.0); 2];
         for (n, ([x, y, _], height)) in modes.enumerate() {
@@ -270,9 +271,9 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// Returns the outputs. `scale_of_spin` returns the quantities of a tank with which the spin of its liquid is compared;
-    /// its argument is the number of the tank, which counts from 0. If it returns `None`, the tank's outputs `spin_ratio`
-    /// and `spin_number` are 0.
+    /// Returns the outputs. `scale_of_spin` maps the number of a tank, which counts from 0, to the
+    /// natural frequency with which the spin of the tank's liquid is compared. If it returns
+    /// `None`, the tank's outputs `spin_ratio` and `spin_number` are 0.
     pub fn outputs(
         &self,
         x: &[f64; STATES],

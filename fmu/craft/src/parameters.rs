@@ -314,8 +314,8 @@ impl Tank {
         }
     }
 
-    /// Returns the coefficients of mode `n`, which counts from 0, if the spin of the liquid changes
-    /// this mode; otherwise `None`.
+    /// Returns the coefficients beyond the third order of mode `n`, which counts from 0, if the
+    /// spin of the liquid changes this mode; otherwise `None`.
     pub(crate) fn gyroscopic(&self, n: usize) -> Option<Higher> {
         Some(self.higher(n)).filter(|higher| higher.gyroscopic != [0.0; 2])
     }
@@ -350,8 +350,8 @@ impl Tank {
         self.fill.points > 0 || self.is_planar() || self.has_surface() || self.spin_inertia > 0.0
     }
 
-    /// Returns the moments of inertia A', A' and I_zz of spinning liquid, kg m2 (`spin.rs`); `None`
-    /// if the tank's liquid has no spin.
+    /// Returns the moments of inertia of the spinning liquid about the tank's x, y and z axes, kg
+    /// m2. Returns `None` if the tank's liquid has no spin.
     pub(crate) fn spin_inertias(&self) -> Option<Vec3> {
         let axial = self.spin_inertia;
         let across = if self.spin_inertia_across > 0.0 { self.spin_inertia_across } else { axial };
@@ -400,8 +400,8 @@ impl Tank {
         [self.hinge_and_across(n).0, e]
     }
 
-    /// Returns the rigid body that represents the bob of mode `n`, which counts from 0, in the constant added mass of
-    /// [`Coupling::Lumped`](crate::Coupling).
+    /// Returns the rigid body that stands for the bob of mode `n` in the constant added mass of
+    /// [`Coupling::Lumped`](crate::Coupling). `n` counts from 0.
     pub(crate) fn lumped(&self, n: usize) -> Rigid {
         let (m, l) = (self.mass[n], self.length[n]);
         let (hinge, across) = self.hinge_and_across(n);
@@ -451,9 +451,9 @@ impl Tank {
         }
     }
 
-    /// Returns the inertia by which bobs with s < 1 reduce the inertia of the craft within 45 degrees of the tank's axis
-    /// (`surface.rs`), as a body of negative mass. The sum of this body, the craft and the rigid liquid must have positive
-    /// inertia.
+    /// Returns the inertia by which bobs with s < 1 can reduce the inertia of the craft
+    /// (`surface.rs`), as a body of negative mass. Slosh angles up to 45 degrees are included. The
+    /// sum of this body, the craft and the rigid liquid must have positive inertia.
     fn inertia_reduction(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {

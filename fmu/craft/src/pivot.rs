@@ -107,8 +107,8 @@ impl Pivot {
     }
 }
 
-/// Power series of the dry friction about one axis, with u = -(w/w_s)^2, e = exp u, v = w/eps and t = tanh v: the series of
-/// w, u', e, v', t, 1 - t^2, C + D e and r.
+/// Power series of the dry friction torque r = (C + D e) t about one axis, where e = exp(u) with u
+/// = -(w/w_s)^2, and t = tanh(v) with v = w/eps, for the rate w.
 #[derive(Clone, Debug)]
 pub(crate) struct Rubbing {
     c: f64,
@@ -158,14 +158,17 @@ impl Rubbing {
         (self.r[n], series::mul(n, &self.r, &self.w))
     }
 
-    /// Estimates the time, s, over which the series of the friction torque converges reliably, from the first three
-    /// coefficients w, w' and w''/2 of the rate.
+    /// Estimates the time, s, over which the series of the friction torque converges reliably, from
+    /// the first three coefficients w, w' and w''/2 of the rate.
     ///
-    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Where |v| is large tanh is so flat
-    /// that its coefficients do not show the poles; therefore half of this distance is used. exp(-v^2) with v = w/w_s has
-    /// no poles. Beyond v = 3 its terms are too small for any tolerance but grow before they decay: over dv the term of
-    /// order n is (2 v dv)^n/n!. The limit either keeps v above 5.3, where the term stays below 1e-12, or makes the terms
-    /// decay from order 5 on.
+    /// The smoothed sign function tanh v, with v = w/eps, has its nearest poles at the distance
+    /// sqrt(v^2 + (pi/2)^2). Half of this distance is used, because at large |v| tanh is so flat
+    /// that its coefficients do not show the poles.
+    ///
+    /// The excess of static friction, exp(-v^2) with v = w/w_s, has no poles. Beyond v = 3 its
+    /// terms are too small for any tolerance but grow before they decay: over a change dv the term
+    /// of order n is (2 v dv)^n/n!. The time is therefore limited so that either v stays above 5.3,
+    /// where the term is below 1e-12, or the terms decay from order 5 on.
     pub(crate) fn convergence_radius(&self, w: [f64; 3]) -> f64 {
         if self.c + self.d == 0.0 {
             return f64::INFINITY;
@@ -197,8 +200,10 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// The expected values of the pivot's torque, dissipated power and energy were computed by hand: Z x (5/4, -3/2, 0) = (9/8,
-    /// 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 + 5/16.
+    /// The expected values were computed by hand for one inertial z axis Z, in body axes, and one
+    /// angular velocity w. The torque of the springs is Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), and
+    /// the torque of the damper c w = (1/4, -1/4, 4). The dissipated power is c w^2 = 1/8 + 1/4 +
+    /// 8, and twice the energy is 2 U = 3/4 + 5/16.
     #[test]
     fn pivot_torque_energy_and_dissipation_equal_those_of_a_spring_and_a_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
@@ -261,9 +266,10 @@ mod tests {
         }
     }
 
-    /// Near rest the series are used up to half of the distance to the nearest pole of tanh, v = i pi/2. The distance in
-    /// time follows from v' t, or from v'' t^2/2 if v' = 0. With an excess D of static friction, from w = 4 w_s on, they are
-    /// used only while w changes by less than 2.5/4 of w_s, if this time is shorter.
+    /// Power series of dry friction are used up to half of the distance to the nearest pole of the
+    /// smoothed sign tanh v, which near rest is v = i pi/2. The time to this point follows from v'
+    /// t, or from v'' t^2/2 if v' = 0. With an excess D of static friction, at rates from w = 4 w_s
+    /// on, w may also change by at most 2.5/4 of w_s.
     #[test]
     fn power_series_of_dry_friction_are_used_up_to_half_the_distance_to_the_nearest_pole() {
         let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };

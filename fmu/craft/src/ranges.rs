@@ -46,17 +46,16 @@ const ROTARY: f64 = 0.8;
 /// an external integrator (Model Exchange) reaches the mass only up to its errors.
 const EMPTY: f64 = 1.0 + 1e-9;
 
-/// Limits within which the pendulums of a tank represent its liquid. If the tank drains, they are the limits at its initial fill,
-/// except for `over_fill`, which has the limits at every fill. `radius` is R, m, and 0 if the tank has no `wave`. `lowest` is for
-/// each mode the value of x below which the liquid leaves the bottom. `g_floor` is the smallest x in w^2, m/s2.
+/// Limits within which the pendulums of a tank represent its liquid. If the tank drains, they hold
+/// for its initial fill, except for `over_fill`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
-    radius: f64,
-    lowest: [f64; MODES],
+    radius: f64,          // R, m; 0 if the tank has no `wave`
+    lowest: [f64; MODES], // x of each mode below which the liquid leaves the bottom
     mode: [ModeBounds; MODES],
-    over_fill: Option<OverFill>,
-    g_floor: f64,
+    over_fill: Option<OverFill>, // limits at every fill
+    g_floor: f64,                // smallest x in w^2, m/s2
     g_bond: f64,
     spin: SpinLimit,
 }
@@ -243,8 +242,9 @@ impl Bounds {
     /// Returns the event indicator of a tank without a model of detached liquid, m/s2. It is negative if the specific force
     /// `axial` along the tank does not hold the liquid of every mode at the bottom, otherwise positive, and never 0.
     pub fn held_indicator(&self, axial: f64) -> f64 {
-        /// Smallest value of the indicator while the liquid is held. Without thrust the margin of the condition is 0, but
-        /// the indicator of an FMU must not be 0 between events.
+        /// Smallest value of the event indicator while thrust holds the liquid at the bottom.
+        /// Without thrust the margin to the limit is 0, but the indicator of an FMU must not be 0
+        /// between events.
         const HELD: f64 = 1e-9;
         let margins = self.lowest[..self.modes].iter().map(|lowest| axial - lowest);
         let margin = margins.fold(1.0 / HELD, f64::min);
@@ -279,8 +279,10 @@ impl Tank {
         [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
     }
 
-    /// Returns the limits of mode `n` of an upright cylinder from its dimensions, rad. The function is not inlined, because the
-    /// compiler would then divide by the diameter before it is compared with 0, which sets a flag that hosts can trap.
+    /// Returns the limits of the slosh angle of mode `n`, rad, of an upright cylinder from the
+    /// cylinder's dimensions. The function is not inlined, because the compiler would then divide
+    /// by the diameter before comparing it with 0. A division by 0 sets a floating-point flag that
+    /// some importing tools trap.
     #[inline(never)]
     fn limits_of_cylinder(&self, n: usize) -> [f64; 2] {
         let fill = 2.0 * self.depth / self.diameter;

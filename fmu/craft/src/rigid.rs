@@ -108,7 +108,8 @@ impl<T: Number> Rigid<T> {
         [force, torque]
     }
 
-    /// Returns the parts w x (w x S) and w x (I w) of [`Rigid::inertial_wrench`].
+    /// Returns the part of [`Rigid::inertial_wrench`] that depends on the angular velocity `w`
+    /// only: the force w x (w x S) and the torque w x (I w).
     pub fn gyroscopic_wrench(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         [cross(w, cross(w, self.moment)), cross(w, times(&self.inertia, w))]
     }

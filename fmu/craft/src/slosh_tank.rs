@@ -316,41 +316,37 @@ impl TankState {
     }
 }
 
-/// The state of the tank and the power series of its motion. `constrained` are the bobs that are guided in a plane or are
-/// not pendulums. `beyond` is the index of the constrained bob that reaches the largest angle of its surface at the end of
-/// the expansion. `w_both` is the pair (w, w). `inv_allowed` is the inverse of the allowed error of the bobs' velocity v,
-/// and `spin_allowed` is the inverse of the allowed error of the spin's I^-1 L.
+/// The state of the tank and the power series of its motion.
 #[derive(Clone, Debug)]
 struct TankMotion {
     state: TankState,
     inputs: TankInputs,
     rigid: Rigid,
     bobs: Vec<Bob>,
-    constrained: Vec<ConstrainedBob>,
+    constrained: Vec<ConstrainedBob>, // guided in a plane, or not pendulums
+    // Constrained bob that reaches the limit of its mode at the end of the expansion
     beyond: Option<usize>,
     spin: Option<SpinSeries>,
     is_apart: bool,
     a: Vector,
     w: Vector,
-    w_both: Pair,
+    w_both: Pair, // (w, w)
     w_d: Vector,
     dissipation: Series,
-    inv_allowed: f64,
-    spin_allowed: f64,
+    inv_allowed: f64,  // 1/allowed error of the bobs' v
+    spin_allowed: f64, // 1/allowed error of the spin's I^-1 L
     ball: Option<Loose>,
 }
 
-/// Additional data of a tank that models detached liquid. `parked` are the bobs while the liquid is detached. `host` is the
-/// carrying craft without the tank. `factors` are the factors of the mass matrix of this craft with all liquid that moves with
-/// it. `turned` is the change of w by impulses that the given w does not contain yet. `rest` are the other forces and torques on
-/// the craft, computed before the first change of the liquid's state within a step.
+/// Additional data of a tank that models detached liquid.
 #[derive(Clone, Debug)]
 struct Loose {
     lump: Lump,
-    parked: Vec<Bob>,
-    host: Rigid,
-    factors: Factors,
-    turned: Vec3,
+    parked: Vec<Bob>, // bobs while the liquid is detached
+    host: Rigid,      // carrying craft without the tank
+    factors: Factors, // of the mass matrix of `host` with all liquid that moves with it
+    turned: Vec3,     // change of w by impulses that the given w does not contain yet
+    // Other loads on the craft, before the liquid's first change of state in a step
     rest: Option<[Vec3; 2]>,
     due: Option<Due>,
     inv_allowed: f64,
@@ -675,8 +671,9 @@ impl TankMotion {
 // Functions for constrained bobs, spin and detached liquid (lump.rs, handover.rs), which a tank with plain
 // pendulums does not need.
 impl TankMotion {
-    /// Sets up rigid liquid and bobs for the present state of the liquid, which may be detached, without allocating. Returns the
-    /// change of w by impulses that the given w does not contain yet.
+    /// Sets up rigid liquid and bobs for the present state of the liquid, settled or detached,
+    /// without allocating. Returns the change of the craft's angular velocity by impulses of the
+    /// liquid that the angular velocity in the inputs does not contain yet.
     #[inline(never)]
     fn start_ball(&mut self) -> Vec3 {
         let Some(ball) = &mut self.ball else { return [0.0; 3] };
@@ -748,11 +745,13 @@ impl TankMotion {
         }
     }
 
-    /// Advances the states of constrained bobs, spin and detached liquid by `h` seconds with their series up to order n; `w`
-    /// is the angular velocity at the end. Returns true if they are finite and not too large.
+    /// Advances the states of constrained bobs, spin and detached liquid by `h` seconds, by their
+    /// series up to order `n`. `w` is the angular velocity at the end. Returns true if the new
+    /// states are finite and not too large.
     ///
     /// # Errors
-    /// If a bob has reached the largest angle of its surface.
+    ///
+    /// If a slosh angle has reached the limit for which its mode is valid.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -777,8 +776,9 @@ impl TankMotion {
         Ok(finite)
     }
 
-    /// Returns the time, within `h` seconds, of the first event: an event of detached liquid, or the instant at which a
-    /// constrained bob reaches the largest angle of its surface. Returns `None` if there is no event.
+    /// Returns the time, within `h` seconds, of the first event: an event of detached liquid, or a
+    /// slosh angle that reaches the limit for which its mode is valid. Returns `None` if there is
+    /// no event.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_ball(n, h);
@@ -811,8 +811,9 @@ impl TankMotion {
         self.change(0, due, t);
     }
 
-    /// Sets up constrained bobs, spin and detached liquid at the start of an expansion. If the liquid has changed its state
-    /// within the step, a and w' are replaced by constant accelerations: those with which the carrying craft would respond.
+    /// Starts the expansions of constrained bobs, spin and detached liquid. If the liquid has
+    /// changed its state within the step, the given a and w' are no longer valid. They are then
+    /// replaced by the constant accelerations with which the carrying craft would respond.
     #[inline(never)]
     fn start_apart(&mut self) {
         let w = self.w[0];
@@ -837,8 +838,9 @@ impl TankMotion {
         (self.w[1], self.w[2]) = (self.w_d[0], [0.0; 3]);
     }
 
-    /// Adds to the impulse the momentum that the carrying craft would have gained over the `h` seconds before `t` by the
-    /// accelerations a^, w'^ (see the module's head) in addition to the momentum that the given a, w' contain.
+    /// Adds an impulse on the carrying craft to the output `impulse`. In the `h` seconds before `t`
+    /// the craft would have had the accelerations a^, w'^ (module's head), but its given a and w'
+    /// do not contain them yet. The impulse is the difference of momentum.
     #[inline(never)]
     fn lag(&mut self, h: f64, t: f64) {
         if self.loose().rest.is_none() {
@@ -872,8 +874,8 @@ impl TankMotion {
         ball.factors.set(&matrix);
     }
 
-    /// Performs all events that are due now (Model Exchange). Returns true if there were events, and `None` if states are so
-    /// large that products of their series could overflow.
+    /// Performs all events that are due now (Model Exchange). Returns true if there were events.
+    /// Returns `None` if states are so large that the power series could overflow.
     fn take_due(&mut self, inputs: &TankInputs) -> Option<bool> {
         self.inputs = *inputs;
         self.forget();
@@ -897,7 +899,7 @@ impl TankMotion {
         is_bounded.then_some(any)
     }
 
-    /// Returns true if states, impulses and the change of w are so small that products of their series cannot overflow.
+    /// Returns true if the states are so small that products of their power series cannot overflow.
     fn is_bounded(&self) -> bool {
         let TankState { x, impulse, .. } = &self.state;
         let turned = self.ball.as_ref().map_or([0.0; 3], |ball| ball.turned);
@@ -1026,17 +1028,15 @@ impl TankMotion {
     }
 }
 
-/// Quantities from which the outputs are computed: `wrench` are force and torque of the liquid on the carrying craft about O,
-/// `loads` are force and torque at a = w' = 0 without the rigid liquid's terms, `matrix` is the added mass M_a, and `turning` is
-/// the rate of the liquid's spin.
+/// Quantities from which the outputs are computed.
 struct Parts<T> {
     motion: [Vec3<T>; 3],
     rigid: Rigid<T>,
-    wrench: [Vec3<T>; 2],
-    loads: [Vec3<T>; 2],
-    matrix: Mat6<T>,
+    wrench: [Vec3<T>; 2], // force and torque on the carrying craft about O
+    loads: [Vec3<T>; 2],  // force and torque at a = w' = 0, without the rigid liquid
+    matrix: Mat6<T>,      // added mass M_a
     bobs: [Option<BobNow<T>>; MODES],
-    turning: Option<T>,
+    turning: Option<T>, // rate of the liquid's spin
     lump: Option<BobNow<T>>,
     ball_state: BallState,
 }
@@ -1203,7 +1203,8 @@ impl SloshTank {
         done
     }
 
-    /// Returns in which ranges of validity of the model the current motion is.
+    /// Returns the validity of the model for the present motion: the regime of the wave, the reason
+    /// if the tank is out of its range, and whether pendulums can represent the liquid.
     pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
         self.bounds.classify(&outputs.tank, self.motion.state.x[LIQUID])
@@ -1274,7 +1275,8 @@ impl SloshTank {
         Ok(changed)
     }
 
-    /// Returns an error if a slosh angle that an external integrator has set is beyond the largest angle of a mode's surface.
+    /// Returns an error if a slosh angle that an external integrator has set is too large for the
+    /// model of its mode.
     pub fn check_surfaces(&self) -> Result<(), StepError> {
         match &self.draining {
             Some(mounted) if mounted.is_curved() => {

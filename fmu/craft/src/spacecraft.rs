@@ -219,7 +219,9 @@ impl Spacecraft {
         Some(ranges)
     }
 
-    /// Returns for each tank in which ranges of validity its present motion is.
+    /// Returns for each tank the validity of the model for the present motion: the regime of the
+    /// wave, the reason if the tank is out of its range, and whether pendulums can represent the
+    /// liquid.
     pub fn ranges(&mut self, inputs: &Inputs) -> [Ranges; TANKS] {
         if let Some(known) = self.discrete_outputs(inputs) {
             return known.map(|(ranges, _)| ranges);
@@ -234,8 +236,9 @@ impl Spacecraft {
         self.motion.state.ranges
     }
 
-    /// Returns true if in any tank without a model of detached liquid pendulums cannot represent the liquid: thrust does not
-    /// hold it at the bottom, or a bob is more than 45 degrees from the axis.
+    /// Returns true if pendulums cannot represent the liquid of some tank that has no model of
+    /// detached liquid: thrust does not hold the liquid at the bottom, or a bob is more than 45
+    /// degrees from the tank's axis.
     pub fn leaves_range(&self, ranges: &[Ranges; TANKS]) -> bool {
         (0..TANKS).any(|i| !ranges[i].is_physical && !self.has_ball(i))
     }
@@ -434,8 +437,9 @@ impl Spacecraft {
         Ok(changed)
     }
 
-    /// Returns an error if states that an external integrator has set are beyond the model: masses of liquid outside the tanks'
-    /// fill tables, bobs beyond the largest angle of their surfaces, or excessive deflections of the appendages.
+    /// Returns an error if states that an external integrator has set are outside the range for
+    /// which the model is valid: a tank's mass of liquid is outside its fill table, a slosh angle
+    /// is too large for its mode, or an appendage is deflected too far for its linear model.
     pub fn check_states(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
         self.motion.check_appendages()?;

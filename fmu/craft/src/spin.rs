@@ -37,14 +37,14 @@ use taylor::vector::{
 use crate::constrained::ConstrainedBob;
 use crate::parameters::Tank;
 
-/// Parameters of a tank's spinning liquid, with the symbols of the module's head. Vectors are the diagonals of
-/// matrices in tank axes.
+/// Parameters of a tank's spinning liquid. The vectors are the diagonals of matrices in tank axes
+/// (symbols of the module's head).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spin {
     axes: Mat3,
-    inverse: Vec3,
-    coupling: Vec3,
-    friction: Vec3,
+    inverse: Vec3,  // I^-1
+    coupling: Vec3, // Gamma
+    friction: Vec3, // K
 }
 
 /// The spinning liquid at an instant: `torque` on the craft and angular momentum Gamma L, body axes; derivative L' by time,
@@ -81,9 +81,9 @@ impl Spin {
         l[2] * self.inverse[2]
     }
 
-    /// Returns the motion of the spinning liquid if its angular momentum is `l` (tank axes) and the angular velocity of
-    /// the craft is `w` (body axes). `reaction` is the contribution of the slosh modes to I_zz s_z, the moment of
-    /// inertia times the slip about the tank's axis.
+    /// Returns the motion of the spinning liquid from its angular momentum `l` (tank axes) and the
+    /// angular velocity `w` of the craft (body axes). `reaction` is the sum of the slosh modes'
+    /// contributions to I_zz s_z, the moment of inertia times the slip about the tank's axis.
     pub fn now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>, reaction: T) -> SpinNow<T> {
         let axes: Mat3<T> = self.axes.map(constant);
         let w = transposed_times(&axes, w);
@@ -148,9 +148,10 @@ impl SpinSeries {
         self.l[0] = l;
     }
 
-    /// Returns coefficient n of the torque of the spinning liquid on the craft and of the dissipated power, from
-    /// coefficient n of the angular velocity `w`; both vectors are in body axes. Sets coefficient n + 1 of the liquid's
-    /// angular momentum L, and of the rate of spin W in all gyroscopic modes among `modes`.
+    /// Returns coefficient n of the torque of the spinning liquid on the craft and of the
+    /// dissipated power, from coefficient n of the angular velocity `w`; both vectors are in body
+    /// axes. Sets coefficient n + 1 of the liquid's angular momentum L, and of the rate of spin W
+    /// in all gyroscopic modes among `modes`.
     #[inline(never)]
     pub fn expand(&mut self, n: usize, w: Vec3, modes: &mut [ConstrainedBob]) -> (Vec3, f64) {
         let Spin { axes, inverse, coupling, friction } = self.spin;

@@ -81,8 +81,9 @@ pub struct Inputs {
     pub mass_flow: [Line; TANKS],
 }
 
-/// Ranges of validity of the model in which a tank's motion is. The motion `is_physical` if thrust holds the liquid at the
-/// tank's bottom and every bob is within 45 degrees of the axis.
+/// Validity of the model for the present motion of a tank: the regime of the wave, and the reason
+/// if the tank is out of its range. `is_physical` is true if thrust holds the liquid at the tank's
+/// bottom and every bob is within 45 degrees of the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct Ranges {
@@ -175,7 +176,7 @@ pub(crate) struct Kept {
 impl Kept {
     const REALS: usize = STATES + 4 + INPUTS;
 
-    /// Value that makes the next step start a new expansion.
+    /// Value without an expansion, after which the next step starts a new one.
     pub const NONE: Kept =
         Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
 
@@ -193,8 +194,8 @@ impl Kept {
         self.is_used() && self.inputs.iter().zip(&inputs.values()).fold(true, same)
     }
 
-    /// Replaces the expansion by one with these `inputs` that starts at the states `x`: the first states, because the
-    /// others are the same as before.
+    /// Stores the start of a new expansion: its `inputs` and the states `x`. States after the last
+    /// element of `x` stay as they are.
     #[inline(always)]
     pub fn renew(&mut self, x: &[f64], inputs: &Inputs) {
         self.x[..x.len()].copy_from_slice(x);

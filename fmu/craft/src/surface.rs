@@ -105,8 +105,9 @@ pub(crate) const LEAST_INERTIA: f64 = 0.5;
 
 const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
-/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order, and, for a mode in liquid that spins, `gyroscopic`
-/// with 1 - C and epsilon. A mode without such terms has only zeros.
+/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order (module's head). In liquid
+/// that spins, `gyroscopic` contains 1 - C and epsilon of the mode (`spin.rs`). A mode without such
+/// terms has only zeros.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Higher {
     pub inertia: f64,
@@ -196,7 +197,8 @@ impl Surface {
         self.stiffness == 0.0 && self.higher.is_none()
     }
 
-    /// Returns (kappa - 1)/8, the contribution of kappa to z/(l u^2), where z is the lift of the bob along the tank's axis.
+    /// Returns (kappa - 1)/8, the factor of l u^2 in the height z of the bob along the tank's axis
+    /// (symbols of the module's head).
     pub fn lift_of_square(&self) -> f64 {
         0.125 * self.stiffness
     }
@@ -209,12 +211,14 @@ impl Surface {
         }
     }
 
-    /// Returns (kappa - 1)/2, the contribution of kappa to beta/u.
+    /// Returns (kappa - 1)/2, the factor of u in the slope beta of the surface (symbols of the
+    /// module's head).
     pub fn bend(&self) -> f64 {
         0.5 * self.stiffness
     }
 
-    /// Returns beta, the slope of the bob's surface: the bob rises along the tank's axis at the rate z' = l beta p_perp.p'.
+    /// Returns beta, the slope of the bob's surface at the squared displacement `u`: the bob rises
+    /// along the tank's axis at the rate z' = l beta p_perp.p' (symbols of the module's head).
     pub fn rise(&self, u: f64) -> f64 {
         self.slope_factor(u)
     }
@@ -239,8 +243,10 @@ impl Surface {
         }
     }
 
-    /// Returns the largest mass by which the bob can reduce the craft's inertia in one direction, divided by the bob's mass:
-    /// minus the smallest eigenvalue of N up to 45 degrees or the end of the model, but at least 0. It is at most 1.
+    /// Returns the largest mass by which the bob can reduce the craft's inertia in one direction,
+    /// divided by the bob's mass. The result is between 0 and 1. It is minus the smallest
+    /// eigenvalue of N (module's head) at slosh angles up to 45 degrees, or up to the angle at
+    /// which the model ends.
     pub fn inertia_reduction(&self) -> f64 {
         let at = |k: u32| {
             let u = 0.5 * f64::from(k) / 64.0;
@@ -253,8 +259,9 @@ impl Surface {
         (0..=64).map_while(at).fold(0.0, f64::max)
     }
 
-    /// Returns the inertia of the bob across its meridian, divided by a pendulum's, and minus the eigenvalue of
-    /// N in this direction.
+    /// Returns the inertia of the bob across the meridian of its surface, divided by a pendulum's,
+    /// and minus the eigenvalue of N (module's head) in this direction. `u` is the squared
+    /// displacement across the tank's axis over l^2.
     fn around(&self, u: f64) -> [f64; 2] {
         let Some(higher) = &self.higher else { return [1.0, 0.0] };
         let more = higher.rotary_inertia(u) * u;
@@ -270,14 +277,15 @@ impl Surface {
         self.least_inertia(-cos, sin * sin) >= LEAST_INERTIA
     }
 
-    /// Returns the slosh angle, rad, up to which the coefficients s and kappa are valid, rounded down to tenths of a degree.
+    /// Returns the largest slosh angle, rad, for which this surface is a valid model, rounded down
+    /// to a tenth of a degree. The limit follows from the coefficients s and kappa.
     pub fn largest_angle(&self) -> f64 {
         let angle = |k: u32| ANGLE_STEP * f64::from(k);
         (0..=1800).map(angle).take_while(|angle| self.holds(*angle)).fold(0.0, f64::max)
     }
 
-    /// Returns the value of eta = p.e (cosine of the bob's angle from the tank's axis) at which the model ends, or
-    /// `None` if it is valid at all angles.
+    /// Returns the value of eta = p.e at which the model ends, where p is the bob's direction and e
+    /// the tank's axis, or `None` if the model is valid at all angles.
     pub fn highest(&self) -> Option<f64> {
         let low = self.largest_angle();
         let (mut low, mut high) = (low, low + ANGLE_STEP);
@@ -321,8 +329,7 @@ pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name
     )
 }
 
-/// The surface at the present position of the bob, with the symbols of the module's head. `eased` is gamma/(1 + gamma u),
-/// `across` is b of a planar mode, and `around` contains n and T/(1 + T u).
+/// The surface of a bob at the bob's present position (symbols of the module's head).
 pub(crate) struct Meridian<T> {
     surface: Surface<T>,
     p: Vec3<T>,
@@ -331,35 +338,33 @@ pub(crate) struct Meridian<T> {
     u: T,
     eta: T,
     beta: T,
-    eased: T,
-    across: Option<Vec3<T>>,
-    around: Option<(Vec3<T>, T)>,
+    eased: T,                     // gamma/(1 + gamma u)
+    across: Option<Vec3<T>>,      // b of a planar mode
+    around: Option<(Vec3<T>, T)>, // n and T/(1 + T u)
 }
 
-/// The height z of the bob with its derivatives by time (the second derivative without the terms in y), and the terms of
-/// E_i: i and E_i/m (`inner`), and `energy_d`, the power -[(s - 1) l l' + s' l^2/2] sigma^2 that E_i/m gains in addition to
-/// the work of the bob. The last field is the rate [(kappa - 1) l]' u^2/8 of z while the bob is at rest.
+/// Height of a bob on its surface, and the terms of its internal energy E_i (symbols of the
+/// module's head).
 pub(crate) struct Lift<T> {
     pub z: T,
     pub z_d: T,
-    pub z_dd: T,
-    pub inner: Vec3<T>,
-    pub energy: T,
-    pub energy_d: T,
-    pub z_at_rest: T,
+    pub z_dd: T,        // without the terms in y
+    pub inner: Vec3<T>, // i
+    pub energy: T,      // E_i/m
+    pub energy_d: T,    // -[(s - 1) l l' + s' l^2/2] sigma^2, in addition to the bob's work
+    pub z_at_rest: T,   // [(kappa - 1) l]' u^2/8, the rate of z while the bob is at rest
     pub rotary: Option<Rotary<T>>,
 }
 
-/// Rotary motion of a mode that has more rotary inertia than a pendulum. `lever` is l u T. `inertia` is l T, with the known
-/// terms 2 w_e sigma and 2 t_2 l sigma tau of l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma tau. `spin` is
-/// l^2 u T tau, with 2 l^2 T tau sigma.
+/// Rotary motion of a mode that has more rotary inertia than a pendulum (symbols of the module's
+/// head).
 pub(crate) struct Rotary<T> {
-    lever: T,
-    inertia: T,
-    turning: T,
-    growing: T,
-    spin: T,
-    swept: T,
+    lever: T,   // l u T
+    inertia: T, // l T
+    turning: T, // 2 w_e sigma
+    growing: T, // 2 t_2 l sigma tau, a term of l (T tau)'
+    spin: T,    // l^2 u T tau
+    swept: T,   // 2 l^2 T tau sigma
     u: T,
     l: T,
     w: Vec3<T>,
@@ -415,8 +420,10 @@ impl<T: Number> Meridian<T> {
         sub(x, self.apply_shear(self.free(self.apply_shear_transposed(x))))
     }
 
-    /// Returns the contribution m J^T N J of the bob to the craft's mass matrix. J maps the accelerations [a; w'] to the
-    /// acceleration a + w' x rho of the bob's position, and N is defined in the module's head.
+    /// Returns the bob's contribution m J^T N J to the craft's mass matrix, for a bob of mass `m`
+    /// at `rho` from O. J maps the craft's accelerations [a; w'] to the acceleration a + w' x rho
+    /// at the bob. N takes the place of the projection p p^T of a pendulum and is defined in the
+    /// module's head.
     pub fn mass_matrix(&self, m: T, rho: Vec3<T>) -> [[T; 6]; 6] {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let mut columns = [[zero; 6]; 6];
@@ -432,8 +439,10 @@ impl<T: Number> Meridian<T> {
         columns
     }
 
-    /// Adds the terms of rotary motion to the bob's contribution `matrix` to the mass matrix. Their direction is [n; rho x
-    /// n - l u e] instead of [n; rho x n], because the rate tau is relative to inertial axes.
+    /// Adds the terms of the bob's rotary motion to `matrix`, the bob's contribution to the craft's
+    /// mass matrix. `m` and `l` are mass and pendulum length, and `rho` is the bob's position from
+    /// O. The terms have the direction [n; rho x n - l u e] instead of [n; rho x n], because tau,
+    /// the rate of rotary motion, is relative to inertial axes (symbols of the module's head).
     pub fn add_rotary(&self, [m, l]: [T; 2], rho: Vec3<T>, matrix: &mut [[T; 6]; 6]) {
         let Some((n, share)) = self.around else { return };
         let arm = cross(rho, n);
@@ -449,8 +458,9 @@ impl<T: Number> Meridian<T> {
         }
     }
 
-    /// Returns the bob's rate that enters the drag on the energy E_i, and the square of this rate; `None` without
-    /// coefficients beyond the third order.
+    /// Returns the rate that enters the drag on the internal energy E_i (module's head), and the
+    /// square of this rate, from the rate `p_d` of the bob's direction. Returns `None` for a mode
+    /// without coefficients beyond the third order.
     pub fn inner_rate(&self, p_d: Vec3<T>) -> Option<(Vec3<T>, T)> {
         self.surface.higher?;
         let sigma = dot(self.p_perp, p_d);
@@ -468,8 +478,9 @@ impl<T: Number> Meridian<T> {
         self.around.map(|(n, _)| n)
     }
 
-    /// Returns the height of the bob and the terms of the internal kinetic energy E_i, from the rate p' of the bob's
-    /// direction, the length l with its derivatives and, if the tank drains, s and kappa with their derivatives.
+    /// Returns the height of the bob and the terms of its internal kinetic energy E_i (module's
+    /// head). `p_d` is the rate p' of the bob's direction. The pendulum length l and, in a tank
+    /// that drains, the coefficients s and kappa are given with their derivatives.
     pub fn lift(
         &self,
         [l, l_d, l_dd]: Jet<T>,
@@ -511,8 +522,9 @@ impl<T: Number> Meridian<T> {
         }
         lift
     }
-    /// Adds the terms of the coefficients beyond the third order to a bob's height and internal energy. Only tanks that do
-    /// not drain have these coefficients.
+    /// Adds the terms of the coefficients beyond the third order, `higher`, to the height and the
+    /// internal energy of a bob in `lift`. `l` is the pendulum length. Only tanks that do not drain
+    /// have these coefficients.
     #[inline(never)]
     fn lift_higher(
         &self,
@@ -565,14 +577,16 @@ impl<T: Number> Meridian<T> {
 }
 
 impl<T: Number> Rotary<T> {
-    /// Returns the term l T u w_e' of the force, which acts along the normal n. `rate_d` is w_e' = e.w', the angular
-    /// acceleration about the tank's axis.
+    /// Returns the term l T u w_e' of the force per mass, which acts along n (symbols of the
+    /// module's head). `rate_d` is w_e' = e.w', the angular acceleration about the tank's axis.
     pub fn pull(&self, rate_d: T) -> T {
         self.lever * rate_d
     }
 
-    /// Returns the torque of rotary motion on the craft, divided by the bob's mass, that is added to the moment of the bob's
-    /// force. `slid` is n.(-l y), and `rate_d` is the angular acceleration e.w' about the tank's axis.
+    /// Returns the torque that the mode's rotary motion exerts on the craft about the tank's axis
+    /// `e`, divided by the bob's mass, in addition to the moment of the bob's force. `slid` is
+    /// n.(-l y) with the symbols of the module's head, and `rate_d` is the craft's angular
+    /// acceleration e.w' about the axis.
     pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
         let tau_d = self.l * self.u * rate_d + self.turning - slid;
         let along = self.l * self.u * (self.inertia * tau_d + self.growing) + self.swept;

@@ -99,7 +99,7 @@ impl FillTable {
     }
 }
 
-/// A quantity and its first two derivatives, by the mass of liquid or by time.
+/// A quantity and its first two derivatives, with respect to either the mass of liquid or time.
 pub(crate) type Jet<T> = [T; 3];
 
 /// Interpolated curve of a quantity: for each interval between two points the coefficients of a quintic polynomial of the
@@ -160,8 +160,9 @@ pub(crate) struct Place<T> {
     inv_h: f64,
 }
 
-/// Contents of a tank with a given mass of liquid: mass, length and hinge height of each mode with their derivatives, and
-/// H_0, I_0 and I_z of the rigid liquid.
+/// Contents of a tank with a given mass of liquid. `modes` has mass, length and hinge height of
+/// each mode. `rigid` has the height H_0 of the rigid liquid and its moments of inertia I_0 and
+/// I_z. All have their derivatives.
 #[derive(Clone, Copy)]
 pub(crate) struct Filling<T> {
     pub place: Place<T>,

@@ -43,13 +43,15 @@ const PREDICTED_SHARE: f64 = 0.25;
 /// following terms are predicted.
 const LARGEST_LAST: f64 = 30.0;
 
-/// Length of a step, s, from which on the step may have the whole allowed error. In a kept [`Expansion`] the allowed error
-/// of a shorter step is proportional to its length, because the errors of more steps add up. After steps of this length the
-/// derivatives at the end of a call are compared with the right-hand side.
+/// Length of a step, s, from which on a step may have the whole allowed error. In a kept
+/// [`Expansion`] the allowed error of a shorter step is proportional to its length, because the
+/// errors of many short steps add up. If a call ends later than this after the start of the
+/// expansion, its derivatives are compared with the right-hand side.
 const FULL_LENGTH: f64 = 0.1;
 
-/// Largest defect of a step, divided by the allowed error of its terms. A step with a larger defect is repeated
-/// with half the length.
+/// Largest error of the functions with rounded corners ([`Motion::defect`]) at the end of a step,
+/// divided by the allowed error of the step's terms. A step with a larger error is repeated with
+/// half the length.
 const DEFECT: f64 = 10.0;
 
 /// Counter of the internal steps of one call: `taken` is the number of steps so far, and `max` the largest allowed number.
@@ -96,12 +98,13 @@ pub enum Convergence {
     Decay,
 }
 
-/// Returns true if the series may end with term n, because two successive terms are negligible: n - 1 and n, n and n + 1, or
-/// n + 1 and n + 2. Terms after n are not computed but predicted. The arguments are terms n, n - 1, n - 2 and n - 3, each
-/// divided by its tolerance.
+/// Returns true if the series may end with term n, because two successive terms are negligible: n -
+/// 1 and n, n and n + 1, or n + 1 and n + 2. The arguments are the terms n, n - 1, n - 2 and n - 3,
+/// each divided by its allowed error.
 ///
-/// For the prediction the slower of two decays over two orders is used: t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)),
-/// and t_(n+2) follows from t_n.
+/// The terms after n are not computed but predicted from the slower of two decays, each over two
+/// orders: t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)). In the same way t_(n+2) follows
+/// from t_n.
 #[inline(always)]
 fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
     // NaN is not negligible; another check ends the step if states are not finite.
@@ -189,8 +192,9 @@ pub trait KeptMotion: Motion {
     #[inline(always)]
     fn store_slopes(&mut self, _n: usize, _h: f64) {}
 
-    /// Returns the error of the states over the time `h`, divided by the allowed error, that follows from a difference of
-    /// derivatives: the derivatives that [`KeptMotion::store_slopes`] has stored minus those of the right-hand side.
+    /// Returns the error of the states over the time `h`, divided by the allowed error. It follows
+    /// from the derivatives that [`KeptMotion::store_slopes`] has stored minus the derivatives of
+    /// the right-hand side.
     #[inline(always)]
     fn slope_defect(&self, _h: f64) -> f64 {
         0.0
@@ -205,13 +209,12 @@ pub trait KeptMotion: Motion {
     fn keep(&mut self) {}
 }
 
-/// Progress of an expansion of the length `h`, s, after order n. `power` is h^(n + 1), `terms` are the last terms divided by
-/// their allowed errors, the newest first, and `negligible` is the number of successive negligible terms at the end.
+/// Progress of the computation of a power series for a step of the length `h`, s.
 struct Progress {
     h: f64,
-    power: f64,
-    terms: [f64; 4],
-    negligible: usize,
+    power: f64,        // h^(n + 1) after order n
+    terms: [f64; 4],   // last terms over their allowed errors, the newest first
+    negligible: usize, // number of successive negligible terms at the end
 }
 
 #[inline(always)]
@@ -253,8 +256,9 @@ fn expand_order<M: Motion>(
     }
 }
 
-/// Expands the motion for at most `h`. Returns the order, and the length, at most `h`, for which the omitted terms
-/// are below the tolerance.
+/// Computes the power series of `motion` from its present states. Returns the order n of the last
+/// term, and the length of the step, s: at most `h`, and short enough that the omitted terms are
+/// below `tolerance`.
 #[inline(always)]
 fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     let mut progress =
@@ -337,13 +341,14 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
 #[derive(Clone, Debug)]
 pub struct Expansion {
     orders: usize,
-    /// Number of the lowest orders whose coefficients were overwritten. They are overwritten if another function uses the
-    /// motion after the expansion.
+    /// Number of orders, from order 0 on, whose coefficients were overwritten, because another
+    /// computation has used the motion since the expansion.
     overwritten: usize,
     norms: [f64; ORDER + 1],
     radius: f64,
     end: Option<(usize, f64)>,
-    /// Time after the start of the expansion, s, up to which a call may end without a comparison with the right-hand side.
+    /// A call that ends up to this time after the start of the expansion, s, needs no comparison of
+    /// its derivatives with the right-hand side.
     verified: f64,
 }
 
@@ -362,7 +367,8 @@ impl Default for Expansion {
 }
 
 impl Expansion {
-    /// Returns the number of orders whose coefficients are known, and 0 if any were overwritten.
+    /// Returns the number of orders whose coefficients are known; 0 if another computation has
+    /// overwritten any of them.
     pub fn orders(&self) -> usize {
         if self.overwritten == 0 { self.orders } else { 0 }
     }
@@ -372,8 +378,8 @@ impl Expansion {
         (self.orders, self.overwritten, self.end, self.verified) = (0, 0, None, FULL_LENGTH);
     }
 
-    /// Records that the coefficients below `order` of all quantities, and coefficient `order` of the states, were
-    /// overwritten. `order` is at most 4.
+    /// Records that another computation has overwritten the coefficients below `order` of all
+    /// quantities, and coefficient `order` of the states. `order` is at most 4.
     #[inline(always)]
     pub fn overwrite(&mut self, order: usize) {
         debug_assert!(order <= 4, "`repair` computes four orders");
@@ -413,21 +419,21 @@ fn compute_order<M: KeptMotion>(motion: &mut M, n: usize, tolerance: f64) {
     motion.expansion().orders = n + 1;
 }
 
-/// Search for the order up to which a series is exact at the time `t` after the start of the expansion. `power` is t^n
-/// divided by the fraction of the allowed error, `terms` are the last terms divided by their allowed errors, the newest
-/// first, and `negligible` is the number of successive negligible terms at the end.
+/// Search for the order up to which a series is exact at the time `t` after the start of the
+/// expansion.
 struct Search {
     t: f64,
     tolerance: f64,
     highest: usize,
     convergence: Convergence,
-    power: f64,
-    terms: [f64; 4],
-    negligible: usize,
+    power: f64,        // t^n over the fraction of the allowed error
+    terms: [f64; 4],   // last terms over their allowed errors, the newest first
+    negligible: usize, // number of successive negligible terms at the end
 }
 
 impl Search {
-    /// Adds the term of order 2. Returns false if the series is not valid at the time `t`.
+    /// Adds the term of order 2. Returns false if `t` is beyond the time over which the series
+    /// converges.
     #[inline(always)]
     fn add_first_term(&mut self, expansion: &Expansion) -> bool {
         self.terms[0] = expansion.norms[2] * self.power;
@@ -546,8 +552,9 @@ fn whole_expansion<M: KeptMotion>(
     Ok((n, length))
 }
 
-/// Returns the length of a step, s, for which the last two terms of the series up to order n are just below the
-/// tolerance; at most `longest`.
+/// Returns the length of a step, s, at most `longest`, at which the larger of the last two terms of
+/// the series, of the orders n - 1 and n, equals its allowed error. `norms` are the coefficients of
+/// the series divided by their allowed errors.
 fn length(norms: &[f64; ORDER + 1], n: usize, longest: f64) -> f64 {
     let length = |n: usize| {
         let term = norms[n];
@@ -812,8 +819,8 @@ mod tests {
         }
     }
 
-    /// The order at which an expansion with the terms 0.1^n/n! ends, from n = 4 on, is compared with the order that
-    /// follows from the terms.
+    /// The terms of this series are 0.1^n/n! from order 4 on. The order at which the expansion ends
+    /// is compared with the order that follows from these terms and from the allowed error.
     #[test]
     fn an_expansion_ends_at_the_order_whose_terms_are_negligible() {
         let order = |convergence, tolerance: f64| {
@@ -837,8 +844,8 @@ mod tests {
         assert_eq!(order(Convergence::Decay, 1e-6), 6);
     }
 
-    /// The arguments of `are_negligible` are the terms n, n - 1, n - 2 and n - 3 of a power series,
-    /// in units of the allowed error.
+    /// The solver decides by `are_negligible` whether a power series may end. The arguments are the
+    /// terms n, n - 1, n - 2 and n - 3 of the series, each divided by its allowed error.
     #[test]
     fn a_series_ends_when_its_next_two_terms_are_negligible_or_predicted_to_be() {
         // Two successive computed terms are at the tolerance.
@@ -899,10 +906,11 @@ mod tests {
         assert_eq!(end, Err(StepError::NotFinite { time: 7.0 }));
     }
 
-    /// A series of the highest order over 50 s is used only up to the time at which one of its last two
-    /// terms reaches the tolerance.
+    /// A step of 50 s is too long for the highest order. It is shortened until the larger of the
+    /// last two terms equals its allowed error.
     #[test]
-    fn a_step_too_long_for_the_highest_order_is_cut_to_where_the_last_two_terms_are_allowed() {
+    fn a_step_too_long_for_the_highest_order_is_shortened_until_the_last_two_terms_are_small_enough()
+     {
         for highest in [10, ORDER] {
             let mut motion = Oscillator { highest, ..Oscillator::new(Convergence::Decay) };
             motion.start(0.0);
@@ -1101,9 +1109,10 @@ mod tests {
         assert!((back[0] / 5.55e-17 - 1.0).abs() < 1e-2, "{back:?}");
     }
 
-    /// The motion y' = sqrt((t - 1)^2 + eps^2). Far from t = 1 its coefficients beyond the first two are of order eps^2, so
-    /// that they do not show the corner. If `compares` is false, the derivatives at the end of a series are not compared
-    /// with the right-hand side.
+    /// The test problem y' = sqrt((t - 1)^2 + eps^2), whose right-hand side has a rounded corner at
+    /// t = 1. Far from t = 1 its coefficients beyond the first two are of order eps^2, so that they
+    /// do not show the corner. If `compares` is false, the derivatives at the end of a series are
+    /// not compared with the right-hand side.
     struct Corner {
         now: [f64; 2],
         begin: [f64; 2],
@@ -1176,7 +1185,9 @@ mod tests {
         }
     }
 
-    /// The exact integral is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 + eps^2) and s = t - 1.
+    /// The exact solution of the test problem is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 +
+    /// eps^2) and s = t - 1. A series across the corner at t = 1 is found to be wrong by a
+    /// comparison of the derivatives at its end.
     #[test]
     fn an_expansion_across_a_corner_is_repeated_over_a_shorter_time() {
         let error = |tolerance: f64, compares: bool| {

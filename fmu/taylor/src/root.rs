@@ -60,7 +60,8 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     first_root_from(t, a, h)
 }
 
-/// Returns the result of [`first_root`] for a polynomial without a zero before `t`, with bounds for parts of the interval.
+/// Returns the first root as [`first_root`] does, for a polynomial that has no zero before `t`. The
+/// bounds hold for parts of the interval, so that the steps stay long enough if the terms grow.
 #[cold]
 fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     if a.iter().any(|x| !x.is_finite()) {
@@ -149,9 +150,10 @@ mod tests {
         assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
     }
 
-    /// The last term of 1 - t^18 is 4e8 times the first term for h = 3, and 1e162 times the first term for h = 1e9.
+    /// The terms of 1 - t^18 grow over intervals longer than 1: the last term is 4e8 times the
+    /// first term at t = 3, and 1e162 times at t = 1e9.
     #[test]
-    fn the_first_root_is_found_also_for_growing_terms() {
+    fn the_first_root_is_found_even_if_the_terms_grow() {
         let mut a = [0.0; 19];
         (a[0], a[18]) = (1.0, -1.0);
         for h in [1.2, 3.0, 10.0, 1e9] {
@@ -166,7 +168,9 @@ mod tests {
         assert!((root - 1e-2).abs() < 2e-6, "{root}");
     }
 
-    /// The rounding error of the value, 1e-16, decides between no root and a double root.
+    /// The minimum of the parabola 1/4 - t + t^2 is 0. If the parabola is raised by 1e-15 it has no
+    /// root, and if it is lowered by 1e-15 it has a root; rounding errors of 1e-16 must not change
+    /// this result.
     #[test]
     fn a_polynomial_has_a_root_only_if_its_minimum_is_below_zero() {
         for h in [1.0, 10.0, 1e3] {

@@ -26,8 +26,9 @@ pub trait System<const D: usize> {
     /// Writes the rates x' of all states in use to `rate`. The elements of `rate` that belong to other states are ignored.
     fn write_rates(&self, t: f64, x: &[f64; D], rate: &mut [f64; D]);
 
-    /// Returns for each state the magnitude to which the error of a step is relative, from states and rates at the start `t`
-    /// of the step. `h` is the remaining length of the stretch, s.
+    /// Returns for each state the magnitude to which the error of a step is relative, from the
+    /// states `x` and their rates `rate` at the start `t` of the step. `h` is the time that is left
+    /// until the end of the integration, s.
     fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
 }
 
@@ -45,18 +46,16 @@ const LEAST_ERROR: f64 = 1e-30;
 /// Larger errors of a step are replaced by this value, whose square does not overflow.
 const LARGEST_ERROR: f64 = 1e100;
 
-/// Weights of some of the rates k_s in a sum, each with its index s.
+/// Weights of the rates k_s in a weighted sum, each preceded by the number s of its rate.
 type Weights = &'static [(usize, f64)];
 
-/// An embedded method with `S` evaluations of the rates: c and a of every evaluation but the first, b, and e of two error
-/// estimates. The first estimate is multiplied by its ratio to the root of the sum of its own square and a hundredth of the
-/// square of the second estimate, and then by `margin`. `order` is the power of h to which the result is proportional.
+/// An embedded Runge-Kutta method with `S` evaluations of the rates.
 struct Method<const S: usize> {
-    stages: &'static [(f64, Weights)],
-    result: Weights,
-    errors: [Weights; 2],
-    margin: f64,
-    order: f64,
+    stages: &'static [(f64, Weights)], // c and a of every evaluation but the first
+    result: Weights,                   // b
+    errors: [Weights; 2],              // e of two error estimates, E_1 and E_2
+    margin: f64,                       // the error is margin E_1^2/sqrt(E_1^2 + E_2^2/100)
+    order: f64,                        // power of h to which the error is proportional
 }
 
 /// Cash and Karp's method of order 5, with an error estimate of order 4.
@@ -92,9 +91,9 @@ const SHORT: Method<6> = Method {
     order: 5.0,
 };
 
-/// Dormand and Prince's method of order 8, with error estimates of orders 5 and 3. The combined estimate is about as large as
-/// the error itself, while the estimate of [`SHORT`] is 5 to 50 times its error. The larger `margin` of this method
-/// compensates for the difference.
+/// Dormand and Prince's method of order 8, with error estimates of orders 5 and 3. The combined
+/// estimate is about as large as the error itself, while the estimate of [`SHORT`] is 5 to 50 times
+/// its error. Therefore this method multiplies its estimate by a larger `margin`.
 const LONG: Method<12> = Method {
     stages: &[
         (0.05260015195876773, &[(0, 0.05260015195876773)]),
@@ -214,8 +213,8 @@ const LONG: Method<12> = Method {
     order: 8.0,
 };
 
-/// Returns true if the error of a step of `h` seconds with [`SHORT`], relative to the motion, is probably below `error`. For
-/// slosh at 2 m/s2 this error is about (h/1 s)^5.
+/// Returns true if a step of `h` seconds with the method [`SHORT`] (order 5) probably has a
+/// relative error below `error`. The estimated error is (h/1 s)^5, which holds for slosh at 2 m/s2.
 fn is_short(h: f64, error: f64) -> bool {
     h < 1.0 && h * h * h * h * h < error
 }
@@ -236,7 +235,8 @@ fn unpack<const D: usize>(moving: &[Range<usize>], packed: &[f64; D], x: &mut [f
     });
 }
 
-/// Sets `sum` to the weighted sum of rates k. Two rates are added at once, which saves loads and stores of the sum.
+/// Sets `sum` to the sum of the rates `k` with the `weights`. Two rates are added at once, which
+/// saves loads and stores of the sum.
 fn combine<const D: usize>(weights: Weights, k: &[[f64; D]], sum: &mut [f64]) {
     sum.fill(0.0);
     let k = |stage: usize, n: usize| k[stage][..n].iter();
@@ -263,8 +263,8 @@ struct Start<'a, const D: usize> {
     allowed: &'a [f64],
 }
 
-/// Tries a step of length h from a start at the time t. Returns the state at its end, and its error divided by the allowed
-/// error; `None` if a state diverges.
+/// Tries a step of the length `h` from `start`, which is at the time `t`. Returns the new states,
+/// and their estimated error divided by the allowed error. Returns `None` if a state diverges.
 fn try_step<const D: usize, const S: usize>(
     system: &impl System<D>,
     method: &Method<S>,
@@ -378,7 +378,8 @@ mod tests {
     use super::*;
     use core::cell::Cell;
 
-    /// Kepler's problem, x'' = -x/|x|^3, on an ellipse. `growth` adds growth x to the rates.
+    /// Kepler's problem, x'' = -x/|x|^3, on an ellipse. A term `growth` times the square of each
+    /// state is added to the rate of this state.
     struct Orbit {
         growth: f64,
         evaluations: Cell<usize>,
@@ -437,7 +438,8 @@ mod tests {
         }
     }
 
-    /// Returns the error of one step of Kepler's problem, and the estimate of this error, both relative to 1.
+    /// Returns the error of one step of the length `h` in Kepler's problem, and the method's
+    /// estimate of this error. Both are relative to 1.
     fn error_and_estimate<const S: usize>(method: &Method<S>, h: f64) -> [f64; 2] {
         let (orbit, mut exact) = (Orbit::new(), START);
         advance(&orbit, &mut exact, (0.0, h), 1e-14, &mut Pace::new(h / 4.0, STEPS)).unwrap();
@@ -463,8 +465,8 @@ mod tests {
         }
     }
 
-    /// The function that returns the error scale gets the remaining length of the stretch, and states that are not in
-    /// use do not change.
+    /// The solver changes only the states in the ranges that `moving` returns. `error_scale`
+    /// receives the time that is left until the end of the integration.
     #[test]
     fn states_that_are_not_in_use_stay_as_they_are() {
         struct Quartic;

@@ -20,8 +20,8 @@ pub type Series = [f64; ORDER + 1];
 
 pub const ZERO: Series = [0.0; ORDER + 1];
 
-/// Returns the quantity at the start of an expansion as a number. A [`Dual`](crate::number::Dual) takes coefficient 1
-/// as its directional derivative.
+/// Returns the value of a power series at the start of the expansion, which is coefficient 0. A
+/// [`Dual`](crate::number::Dual) also takes coefficient 1, as its directional derivative.
 pub fn number<T: Number>(a: &Series) -> T {
     T::with_slope(a[0], a[1])
 }

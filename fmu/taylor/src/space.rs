@@ -37,7 +37,8 @@ impl Pair {
         [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
     }
 
-    /// Sets coefficient n + 1 of both vectors from coefficient n of their rates.
+    /// Sets coefficient n + 1 of both vectors of the pair from coefficient n of their derivatives
+    /// by time. `rates[i]` has component i of both derivatives.
     #[inline(always)]
     pub fn set_next(&mut self, n: usize, rates: [[f64; 2]; 3]) {
         self.0[n + 1] = rates.map(|pair| pair.map(|rate| rate * RECIPROCAL[n + 1]));
@@ -212,8 +213,9 @@ pub fn cross_ramp<const N: usize>(a: &Vector, ramp: &[Vec3; 2]) -> Vec3 {
     if N == 0 { first } else { vector::add(first, vector::cross(a[N - 1], ramp[1])) }
 }
 
-/// Coefficients of a quaternion (a, b, c, d), stored as the pairs from which its rate is computed by multiplication with the
-/// components of w: (-b, a), (c, d), (-d, c), (a, b).
+/// Coefficients of a quaternion (a, b, c, d), stored as the pairs (-b, a), (c, d), (-d, c) and (a,
+/// b). The products of these pairs with the components of the angular velocity w give two
+/// components of the quaternion's rate at once.
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Attitude([[[f64; 2]; 4]; ORDER + 1]);
@@ -282,7 +284,9 @@ mod tests {
     use crate::for_each_order;
     use crate::series::ZERO;
 
-    /// At a constant rate the equations q' = q o (0, w)/2 and y' = -w x y have closed solutions.
+    /// At a constant angular velocity w, the attitude quaternion follows q' = q o (0, w)/2, and the
+    /// components of a fixed vector in the rotating axes follow y' = -w x y. Both equations have
+    /// closed solutions.
     #[test]
     fn a_constant_rate_turns_attitude_and_components_by_rodrigues_formula() {
         let rate = [0.3, -0.8, 0.5];

@@ -368,7 +368,10 @@ fn errors_stay_within_the_solver_tolerance_with_appendages() {
     }
 }
 
-/// If the sum of the squared participations exceeds the mass of the craft, the reduced mass matrix has a negative mass.
+/// If the sum of the squared participations exceeds the mass of the craft, the mass that remains
+/// for the craft is negative. An appendage mode with a participation of 34 kg^0.5 is accepted,
+/// because 34^2 kg is less than the craft's 1180 kg, but 35 kg^0.5 is refused. Excessive
+/// deflections are refused at the start and in a step.
 #[test]
 fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     let mut p = Parameters { appendages: 1, ..Parameters::default() };

@@ -185,7 +185,8 @@ fn momentum_angular_momentum_and_energy_balance_over_10_s_of_random_craft() {
     random_craft(END / 100);
 }
 
-/// Like the test over 10 s, but over 100 s.
+/// Random craft are simulated for 100 s. Momentum and angular momentum must change only by the
+/// forces and torques on the craft, and the energy only by their work and by damping.
 #[test]
 #[ignore = "20 s: .ci/run --nightly"]
 fn momentum_angular_momentum_and_energy_balance_over_100_s_of_random_craft() {

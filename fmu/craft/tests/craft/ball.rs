@@ -191,7 +191,7 @@ fn bounces_are_a_geometric_series_that_ends_at_rest() {
 /// The thrust is reversed for 3 s, so that the liquid leaves the bottom. When the thrust acts forwards again, the liquid
 /// settles, and energy has been dissipated.
 #[test]
-fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
+fn detached_liquid_becomes_a_pendulum_again_when_thrust_returns() {
     let p = craft();
     let forward = thrust(600.0);
     let mut craft = Spacecraft::new(&p, &forward, 0.0, 1e-9).unwrap();
@@ -213,7 +213,9 @@ fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     assert!((out.momentum[2] - 600.0 * 25.0 + 180.0).abs() < 1e-8);
 }
 
-/// Simulates a craft with periods of thrust forwards and backwards, and then without thrust. Calls `check` every 0.5 s.
+/// Simulates a craft for `end` steps of 0.5 s: with random thrust up to step 60, and then without
+/// thrust. Calls `look` after each step with the outputs before and after the step, and with true
+/// if there is no thrust. Returns how often each state of the liquid was seen.
 fn drive(
     p: &Parameters,
     seed: u64,
@@ -333,8 +335,10 @@ fn results_do_not_depend_on_the_communication_step() {
     }
 }
 
-/// Simulates 20 s of thrust in any direction and 20 s of the opposite thrust, with liquid that bounces and slides. Returns
-/// attitude, angular velocity and the liquid's position and velocity every 2 s.
+/// Simulates a craft for 20 s under thrust in a random direction and for 20 s under the opposite
+/// thrust. The liquid detaches, bounces and slides. `step` is the communication step, s, and
+/// `shift` is added to the bob's initial direction. Returns attitude, angular velocity and the
+/// liquid's position and velocity every 2 s.
 fn detached(seed: u64, tolerance: f64, step: f64, shift: f64) -> Vec<f64> {
     let (mut r, mut p) = (Random::new(seed), craft());
     let (m, ball) = (p.craft.mass, &mut p.tank[0].ball);
@@ -435,8 +439,9 @@ pub(super) fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 
-/// Returns the wall that stops the centre of the detached liquid, a spheroid: the height of its centre on the tank's axis, and
-/// its semi-axes b, b, a. Both follow from the liquid's centre at rest and the pendulums' first moments m l.
+/// Returns the surface that bounds the centre of the detached liquid, a spheroid: the height of its
+/// centre on the tank's axis, and its semi-axes b, b, a. Both follow from the liquid's centre at
+/// rest and from the mass times length of each pendulum.
 pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     let tank = &p.tank[i];
     let modes = || 0..tank.modes;
@@ -633,8 +638,8 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     }
 }
 
-/// The two bodies of the independent simulator, in inertial axes: the dry craft, which includes J_a, and the detached liquid
-/// as a free particle.
+/// The two bodies of the independent simulator, in inertial axes. One is the dry craft with J_a,
+/// the inertia of the liquid about its centre; the other is the detached liquid as a free particle.
 #[derive(Clone, Copy)]
 struct Pair {
     place: V,

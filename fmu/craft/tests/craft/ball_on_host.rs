@@ -466,8 +466,9 @@ fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_m
     assert!(coarse.iter().all(|error| *error < 1e-2), "{coarse:?}");
 }
 
-/// Returns the tank of [`one`] with its liquid in the state `ball`, and an acceleration of the tank that presses the liquid
-/// against the wall if the liquid slides.
+/// Returns the tank of a random craft with one tank (function `one`), with its liquid in the state
+/// `ball`, and its inputs. If the liquid slides, the acceleration in the inputs presses it against
+/// the wall.
 fn placed(seed: u64, ball: BallState) -> (SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let p = one(&mut random);

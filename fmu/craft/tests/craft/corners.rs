@@ -72,9 +72,11 @@ fn table_with_flows(r: &mut Random) -> Vec<Row> {
     rows
 }
 
-/// Returns a craft with one or two tanks. Their drag depends on the specific force by one of the damping laws; in half of the
-/// craft the smoothing a_f has its default. A third of the modes has drag that grows with the amplitude, and a third has breaking
-/// waves. In a sixth of the tanks the bobs move on surfaces other than spheres.
+/// Returns a random craft with one or two tanks. The drag of the bobs depends on the specific force
+/// by one of the damping laws. In half of the craft a_f, the specific force over which this law is
+/// smoothed near weightlessness, has its default. A third of the modes has drag that grows with the
+/// amplitude, and a third has breaking waves. In a sixth of the tanks the bobs move on surfaces
+/// other than spheres.
 fn parameters(r: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1 + r.below(2), mount: Mount::Free, ..r.parameters() };
     p.max_steps = 1_000_000;
@@ -206,8 +208,8 @@ fn craft_states(p: &Parameters, rows: &[Row], way: Way) -> Vec<f64> {
     all
 }
 
-/// Returns the largest difference between two states, divided by 1 rad or 1 rad/s. If the largest rate is above 1 rad/s, the
-/// difference is divided by this rate.
+/// Returns the largest difference between the states `a` and `b`, relative to 1 rad and 1 rad/s, or
+/// to the largest rate if this rate is above 1 rad/s.
 fn off(a: &[f64], b: &[f64]) -> f64 {
     let size = b.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
@@ -316,8 +318,8 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_craft() {
     keep_the_tolerance(0..8, craft_of);
 }
 
-/// A tank under 1,000 random histories of thrust moves as in runs with much shorter steps, up to a few
-/// tolerances of the solver.
+/// A tank under 1,000 random histories of thrust is compared with runs in much shorter steps. The
+/// results differ by at most a few times the solver's tolerance.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
@@ -329,8 +331,10 @@ fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
     keep_the_tolerance(0..200, draining_craft_of);
 }
 
-/// The reference uses Newton's law (independent.rs) and Runge-Kutta steps of 0.2 ms, and thereby neither the power series nor the
-/// formulas of the craft. Its rates are exact to 1e-7, because the slope of a_+ may change by a factor of two within a step.
+/// The reference integrates Newton's law (independent.rs) by Runge-Kutta steps of 0.2 ms. It uses
+/// neither the power series nor the formulas of the craft. Its rates are exact to 1e-7 only,
+/// because the slope of a_+, the smoothed acceleration in the drag, may change by a factor of two
+/// within a step.
 #[test]
 fn thrust_that_crosses_zero_moves_a_craft_as_newtons_law_with_another_integrator() {
     for seed in every_or(&[1, 30], [1, 6, 9, 30]) {

@@ -80,7 +80,8 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
     }
 }
 
-/// Steepness of the first mode in a cylinder divided by the slosh angle, with k = xi/R and the elevation 2 R/(xi^2 - 1).
+/// Ratio of the steepness k a of the first mode in an upright cylinder to the slosh angle, 1/rad,
+/// with the wave number k = xi/R and the elevation 2 R/(xi^2 - 1) per rad.
 const STEEPNESS: f64 = 2.0 * 1.841183781340659 / (1.841183781340659 * 1.841183781340659 - 1.0);
 
 fn rounded(x: f64) -> f64 {
@@ -119,8 +120,8 @@ fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breakin
     }
 }
 
-/// Returns the ranges of validity of a tank in a craft with this thrust. Asserts that the single tank has the same ranges
-/// under the craft's motion.
+/// Returns the ranges of validity of the tank in a craft under this `thrust`. Asserts that the tank
+/// alone, if it is moved like the craft, has the same ranges.
 fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     let mut p = Parameters::default();
     p.tank[0] = tank;
@@ -166,9 +167,11 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_reversed_thrust_is_out_of_ran
     assert!(ranges(800.0, -2000.0, 0.1).is_in_range());
 }
 
-/// The output `regime` depends on the sum of the waves of all modes. 0.1 rad of the first mode are 0.084 R, in the linear
-/// range. If the wave of the second mode is half as high, 0.1 rad of both modes are 0.126 R, and 0.15 rad of both are 0.188
-/// R. If a tank has no wave height per angle, the value of a cylinder is used for the first mode.
+/// The output `regime` depends on the sum of the waves of all modes, relative to the tank's radius
+/// R. 0.1 rad of the first mode are a wave of 0.084 R, in the linear range. If the second mode has
+/// half this wave height per angle, 0.1 rad of both modes are 0.126 R, and 0.15 rad of both are
+/// 0.188 R. If a tank has no wave height per angle, the value of a cylinder is used for the first
+/// mode.
 #[test]
 fn the_regime_follows_from_the_waves_of_all_modes_together() {
     let with = |wave: [f64; MODES], angle: f64| {
@@ -188,7 +191,7 @@ fn the_regime_follows_from_the_waves_of_all_modes_together() {
 /// A pendulum of each tank in turn is within 45 degrees of its tank's axis, or beyond. The check at the end of a step must agree
 /// with the ranges in the outputs.
 #[test]
-fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
+fn a_step_ends_out_of_range_if_any_pendulum_passes_45_degrees() {
     let mut found = [0; 2];
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1), (3, 0), (3, 1)] {
         for angle in [0.6, 1.0f64] {
@@ -218,10 +221,11 @@ fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     assert_eq!(found, [6, 6]);
 }
 
-/// The thrust is along the axis of the first tank and opposite to the axis of the second tank, where the liquid stays at the
-/// bottom only if k l/m is above 1.3 m/s2.
+/// The thrust is along the axis of the first tank and opposite to the axis of the second tank.
+/// There the liquid stays at the bottom only if the centring stiffness k gives it an acceleration k
+/// l/m above 1.3 m/s2.
 #[test]
-fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
+fn the_range_of_each_tank_depends_on_the_acceleration_along_its_own_axis() {
     for (k, holds) in [(500.0, false), (800.0, true)] {
         let mut p = Parameters { tanks: 2, ..Parameters::default() };
         p.tank = [0.0, 0.0, 0.0, 0.0].map(|angle| Tank { k: [k; MODES], ..tank(angle) });
@@ -274,7 +278,7 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
 /// nothing flows out, both must have the same drag; here the fill table has the values of the default tank at one of its points.
 /// This is tested on a pivot and in free flight, under every damping law, with thrust in both directions.
 #[test]
-fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
+fn a_fill_table_without_outflow_does_not_change_the_drag() {
     for (seed, law) in DampingLaw::ALL.into_iter().cycle().take(12).enumerate() {
         let mut random = super::random::Random::new(seed as u64);
         let mut p = Parameters { tanks: 2, ..random.parameters() };
@@ -302,9 +306,10 @@ fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
     }
 }
 
-/// The damping ratio is computed from the dissipated power, 2 zeta m w l^2 rate^2. It must be zeta_A A + zeta_b f(k a) with
-/// A^2 = angle^2 + (rate/w)^2 + A_0^2; with the sine of the angle it would be 8 % smaller at 0.7 rad. Draining tanks and
-/// planar modes are tested as well, because they have their own equations.
+/// The damping ratio follows from the dissipated power 2 zeta m w l^2 rate^2. It must be zeta_A A +
+/// zeta_b f(k a) with A^2 = angle^2 + (rate/w)^2 + A_0^2, a function of the slosh angle. With the
+/// sine of the angle it would be 8 % smaller at 0.7 rad. Draining tanks and planar modes are tested
+/// as well, because they have their own equations.
 #[test]
 fn amplitude_damping_grows_with_the_slosh_angle_not_with_its_sine() {
     let (zeta_a, zeta_b, begins) = (0.05, 0.04, 0.6);

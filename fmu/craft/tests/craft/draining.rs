@@ -103,8 +103,9 @@ fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     }
 }
 
-/// The momentum of the craft is m V + w x S + S' + f r_out by Newton's and Euler's laws. S' is computed from differences of the centre of
-/// mass in the outputs.
+/// By Newton's and Euler's laws the momentum of the craft is m V + w x S + S' + f r_out, with the
+/// first moment S about O, the outflow f and the position r_out of the outlet. S' is computed from
+/// differences of the centre of mass in the outputs.
 #[test]
 fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
     for seed in (0..6).chain(20..23).chain(40..43) {
@@ -228,7 +229,7 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
 /// Without flow the equations of a draining tank give the same motion as the equations of a tank with constant mass,
 /// for every damping law.
 #[test]
-fn a_fill_table_without_outflow_changes_nothing() {
+fn a_fill_table_without_outflow_does_not_change_the_motion() {
     for seed in 0..4 {
         let (mut p, mut u) = draining_craft(seed, 2);
         for (n, tank) in p.tank.iter_mut().enumerate() {
@@ -321,8 +322,9 @@ fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     }
 }
 
-/// At each point of the table and under every damping law, the rates equal those of a tank in which this point's damping
-/// ratio holds at every fill.
+/// A draining tank with a damping ratio at each point of its fill table is compared, at each of
+/// these points, with a tank that has this point's damping ratio at every fill. The derivatives of
+/// the states are equal under every damping law.
 #[test]
 fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     for (i, law) in DampingLaw::ALL.into_iter().enumerate() {

@@ -29,8 +29,8 @@ impl Case {
         (0.1 * radius / f64::sqrt(4.0 * acceleration * semi.z)).min(0.02)
     }
 
-    /// Returns true if the liquid leaves the bottom at the start and does not settle afterwards. Only for such motions does
-    /// the simulator have equations.
+    /// Returns true if the liquid leaves the bottom at the start and does not settle afterwards,
+    /// because the independent simulator of this test has no equations for settled liquid.
     fn never_settles(&self) -> bool {
         let mut craft = Spacecraft::new(&self.p, &self.u, 0.0, 1e-9).unwrap();
         (0..100).all(|k| {
@@ -78,8 +78,9 @@ fn case(seed: u64) -> Case {
     Case { p, u, end }
 }
 
-/// Centre of mass of the dry craft and its velocity, attitude, angular velocity (body axes), the liquid's centre and its
-/// velocity, and dissipated energy; inertial axes unless stated otherwise.
+/// The states of the independent simulator: position and velocity of the dry craft's centre of
+/// mass, attitude, angular velocity (body axes), position and velocity of the liquid's centre, and
+/// dissipated energy. Vectors are in inertial axes unless stated otherwise.
 type Coordinates = [f64; 20];
 
 const PLACE: usize = 0;
@@ -336,7 +337,8 @@ impl Simulator<'_> {
         self.rates(&self.y, mode).1 > 0.0
     }
 
-    /// Sets f and n.x' of liquid on the wall to 0, because integration errors make them slightly different from 0.
+    /// Sets f, the function that describes the wall, and the normal speed n.x' of liquid on the
+    /// wall to 0, because integration errors make them slightly different from 0.
     fn put_on_wall(&mut self) {
         if self.mode == Mode::Flying {
             return;

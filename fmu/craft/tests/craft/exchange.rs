@@ -88,8 +88,11 @@ fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     }
 }
 
-/// A rigid body with attached tanks, as the importer of a SloshTank simulates it: its states are q, w, r, V and the tanks'
-/// states. Every stage of the integrator solves (M_body + sum of M_a) [a; w'] = rest + sum of bias.
+/// A rigid body with attached tanks, which is simulated as an importer of SloshTank would simulate
+/// it. Its states are the body's attitude q, angular velocity w, position r and velocity V, and the
+/// states of the tanks. Every stage of the integrator solves (M_body + sum of M_a) [a; w'] = rest +
+/// sum of bias. M_a and bias are outputs of the tanks, and rest contains all other forces and
+/// torques on the body.
 pub struct HostWithTanks {
     p: Parameters,
     tanks: Vec<SloshTank>,
@@ -170,8 +173,9 @@ impl HostWithTanks {
 
 type V3 = nalgebra::Vector3<f64>;
 
-/// The rigid body with its tanks and a Spacecraft are integrated by the same method with the same steps, so that they
-/// differ only by rounding.
+/// The rigid body solves for its accelerations with the tanks' added mass and bias
+/// ([`Coupling::Split`]) in every stage of its integrator. A Spacecraft is integrated by the same
+/// method with the same steps, so that the results differ only by rounding.
 #[test]
 fn tanks_on_a_host_that_splits_inertia_in_every_stage_move_as_spacecraft() {
     for seed in 0..30 {

@@ -26,14 +26,16 @@ use super::waves::G;
 
 struct Row {
     is_circle: bool,
-    /// Frequency divided by that of small waves, and acceleration divided by g.
+    /// Frequency of the forcing divided by the natural frequency of small waves, and acceleration
+    /// divided by g.
     forcing: [f64; 2],
     wave: Wave,
     tank: Tank,
 }
 
-/// A steady wave: the largest slosh angle, and the phase along the x axis; amplitude and phase along the y axis (all in
-/// degrees); and the largest force divided by the weight of the slosh mass.
+/// A steady forced wave. The first four numbers are the largest slosh angle, the phase along the x
+/// axis, and amplitude and phase along the y axis, all in degrees. The last is the largest force
+/// divided by the weight of the slosh mass.
 struct Wave {
     angle: f64,
     phase: f64,
@@ -85,8 +87,9 @@ fn rows() -> Vec<(String, Row)> {
 }
 
 impl Row {
-    /// Simulates the tank with about the wave of the row as the initial state, and evaluates the last period when the
-    /// transient has decayed by a factor of 280. Returns the wave, and true if the tank left its range of validity.
+    /// Simulates the tank from a state near the steady wave of the row until the transient has
+    /// decayed by a factor of 280. Returns the wave in the last period, and true if the tank left
+    /// its range of validity.
     fn simulate(&self) -> (Wave, bool) {
         let [ratio, push] = self.forcing;
         let (w, across) = (ratio * G.sqrt(), f64::from(u8::from(self.is_circle)));
@@ -136,8 +139,9 @@ impl Row {
     }
 }
 
-/// Angle, amplitude across the line and force agree within 3 % and the phases within 3 degrees, unless the outputs of the tank
-/// state that it is out of range.
+/// The tank is shaken along a line. The slosh angle, the amplitude across this line and the force
+/// agree with potential flow within 3 %, and the phases within 3 degrees, unless the outputs of the
+/// tank state that it is out of range.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn forced_waves_agree_with_potential_flow_or_are_out_of_range() {

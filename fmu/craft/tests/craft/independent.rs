@@ -59,8 +59,8 @@ fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     (Some(across), on_axis - across * tank.arm[n])
 }
 
-/// Returns the torque of the craft's pivot: of the springs that rotate the body's z axis to the inertial z axis, of damping
-/// and of dry friction.
+/// Returns the torque of the craft's pivot, body axes. It is the sum of the torques of damping, of
+/// dry friction, and of the springs, which rotate the body's z axis to the inertial z axis.
 fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     let upright = rotation(&x[..4]).inverse() * V::z();
     let pull = V::new(p.pivot.k[1] * upright.x, p.pivot.k[0] * upright.y, 0.0);
@@ -144,17 +144,20 @@ struct Shape {
     rate: V,
     q: V,
     q_d: V,
-    /// The derivative dz/d|q|^2 of the height z with respect to the squared displacement, and then the second derivative.
+    /// Derivative of the bob's height z with respect to its squared displacement |q|^2 across the
+    /// tank's axis. `bend` is the second derivative.
     slope: f64,
     bend: f64,
-    /// Half the gradient of the left side of the surface's equation divided by l, and the terms of the second derivative of
-    /// the left side that do not contain x''.
+    /// Half the gradient of the equation that describes the surface, divided by l. `curving` are
+    /// the terms of this equation's second derivative by time that do not contain x''.
     normal: V,
     curving: f64,
 }
 
 impl Shape {
-    /// Computes position and rate of the bob from the direction `rod` and the rate `rod_d` of a pendulum with the same q.
+    /// Computes position and rate of the bob of mode `n`. `rod` and `rod_d` are the position and
+    /// the rate of a pendulum's bob, from the hinge, that has the same displacement q across the
+    /// tank's axis `e`.
     fn from_rod(tank: &Tank, n: usize, e: V, rod: V, rod_d: V) -> Shape {
         let l = tank.length[n];
         let across = |x: V| x - e * e.dot(&x);
@@ -687,9 +690,11 @@ fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     }
 }
 
-/// The constant matrix of `Lumped` contains each bob as a point mass at its hinge, and the bobs of planar modes with twice their
-/// mass. This matrix minus M_a is positive semidefinite for all directions of the bobs, so that the remaining algebraic loop
-/// converges. With less than twice the mass of planar modes the difference would not be positive semidefinite.
+/// The constant added mass of [`Coupling::Lumped`] contains each bob as a point mass at its hinge,
+/// and the bobs of planar modes with twice their mass. This matrix minus the true added mass M_a is
+/// positive semidefinite for all directions of the bobs, so that an importer's iteration over the
+/// remaining algebraic loop converges. With less than twice the mass of planar modes the difference
+/// would not be positive semidefinite.
 #[test]
 fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     let mut tight = 0;
@@ -724,9 +729,11 @@ fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     assert!(tight > 5);
 }
 
-/// A SloshTank that is moved like the tank of a craft, whose motion is computed by Newton's law, has the same force and torque
-/// and the same p'' of its bobs as the tank in the craft. The drag must not depend on the acceleration here, because in the craft
-/// it would depend on the motion of craft and liquids as one rigid body, but in the SloshTank on the given motion.
+/// A SloshTank that is moved like the tank of a craft, whose motion is computed by Newton's law,
+/// has the same force and torque and the same p'' of its bobs as the tank in the craft. The drag
+/// does not depend on the acceleration here. Otherwise it would differ, because the craft computes
+/// the acceleration from the motion of craft and liquids as one rigid body, and the SloshTank takes
+/// it from its inputs.
 #[test]
 fn a_single_tank_follows_newtons_law() {
     for seed in 0..300 {
@@ -768,9 +775,10 @@ fn a_single_tank_follows_newtons_law() {
     }
 }
 
-/// The force and torque of a tank in a craft equal those of the single tank under the craft's motion. The drag does not
-/// depend on the acceleration, because in the craft it would depend on the motion of craft and liquids as one rigid body,
-/// but in the single tank on the given motion.
+/// The force and torque of a tank in a craft equal those of a SloshTank that is moved like the
+/// craft. The drag does not depend on the acceleration here. Otherwise it would differ, because the
+/// craft computes the acceleration from the motion of craft and liquids as one rigid body, and the
+/// SloshTank takes it from its inputs.
 #[test]
 fn a_single_tank_under_the_crafts_motion_moves_as_the_tank_in_the_craft() {
     for seed in 0..100 {

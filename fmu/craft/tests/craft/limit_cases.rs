@@ -73,8 +73,8 @@ impl Case {
         self.motion.axial / self.tank.length[0] + self.tank.k[0] / self.tank.mass[0]
     }
 
-    /// Returns the spin rate, rad/s, at which the first of the two spin limits is reached, by other formulas than
-    /// those that are tested.
+    /// Returns the spin rate, rad/s, at which the first of the two limits of spin is reached. It is
+    /// computed by other formulas than those under test.
     fn largest_spin(&self) -> f64 {
         let radius = self.tank.wave[0] * (XI * XI - 1.0) / 2.0;
         let kh = (radius / (XI * self.tank.length[0])).atanh();

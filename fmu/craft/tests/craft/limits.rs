@@ -58,8 +58,9 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     assert_eq!(reason(&tank, still), LimitedBy::None);
 }
 
-/// The tank is on the axis of a spinner that rotates at 9 rad/s. Its free surface is 5.5 cm higher at the wall than its
-/// mean: R = 0.3 m, h = 0.4 m, 5 m/s2. The craft and the single tank report the same reason.
+/// A tank on the axis of a spinner that rotates at 9 rad/s is out of range because of the spin: its
+/// free surface is 5.5 cm higher at the wall than its mean (R = 0.3 m, h = 0.4 m, 5 m/s2). The
+/// craft and the single tank report this same reason.
 #[test]
 fn a_tank_on_a_spinner_is_limited_by_spin() {
     let mut p = Parameters::default();

@@ -9,7 +9,8 @@ use serde_json::Value;
 
 use super::component::{SloshTank, Spacecraft};
 
-/// Communication step of the records, s. Between its multiples the inputs are linear.
+/// Communication step of the reference simulations, s. The inputs are linear in time within each
+/// step.
 pub const STEP: f64 = 0.02;
 
 /// Reads the records of the kind `craft` or `tank`. The environment variable SIX_JSON may contain the path of another file
@@ -109,8 +110,8 @@ pub fn tank_parameters(record: &Value) -> TankParameters {
     TankParameters { tank: tank(&record["tank"]), ..TankParameters::default() }
 }
 
-/// Returns an input of the craft between time knot k and the next as a ramp (value and slope): the sum of the `terms`
-/// whose port is `port`.
+/// Returns an input of the craft between time knot `k` and the next knot, as a ramp (value and
+/// slope). It is the sum of those elements of `terms` that belong to the input named `port`.
 fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
     let knot = |k: usize| k as f64 * STEP;
     let mut ends = [[0.0; 3]; 2];

@@ -26,8 +26,9 @@ impl Deviations {
         assert_eq!(*scale, largest);
     }
 
-    /// Returns a line for each signal whose difference from the record exceeds the digits that the record states. The
-    /// numbers in the record are rounded to 14 digits, which `digits_of` takes into account.
+    /// Returns a message for each signal that deviates from the reference record by more than the
+    /// accuracy, in digits, that the record states for it. `digits_of` allows for the rounding of
+    /// the record's numbers to 14 digits.
     fn excess(&self, record: &Value) -> Vec<String> {
         let name = record["name"].as_str().unwrap();
         let mut excess = Vec::new();

@@ -132,8 +132,9 @@ fn an_initial_velocity_is_refused_only_on_a_pivot() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// For each pair of axes |J_ij|^2 may be up to J_ii J_jj. A thin rod, J = (0, 1, 1) in axes of which x lies along it, has exactly
-/// this largest value if the axes are rotated.
+/// Products of inertia are refused if |J_ij|^2 exceeds J_ii J_jj for a pair of axes i and j. A thin
+/// rod, J = (0, 1, 1) in axes of which x lies along it, has exactly this largest value if the axes
+/// are rotated.
 #[test]
 fn products_of_inertia_need_moments_of_inertia_large_enough() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
@@ -193,7 +194,7 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
 /// The pendulum length l follows from the frequency f by (2 pi f)^2 = g/l + k/m. This equation has a solution only if f is
 /// above the frequency that the stiffness k alone causes.
 #[test]
-fn a_slosh_frequency_must_give_a_pendulum_length() {
+fn a_slosh_frequency_without_a_valid_pendulum_length_is_refused() {
     let mut p = craft();
     let tank = &mut p.tank[0];
     (tank.mass[0], tank.k[0]) = (100.0, 400.0); // 2 rad/s alone
@@ -215,7 +216,7 @@ fn a_slosh_frequency_must_give_a_pendulum_length() {
 
 /// The mass of liquid must increase from point to point, and must be at least the sum of the modal masses.
 #[test]
-fn a_fill_table_must_rise_and_contain_the_modal_masses() {
+fn the_masses_in_a_fill_table_must_increase_and_include_the_modal_masses() {
     let with = |change: fn(&mut Tank)| {
         let mut p = craft();
         p.tank[0].fill.points = 3;

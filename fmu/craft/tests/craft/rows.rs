@@ -59,8 +59,9 @@ fn bits(craft: &Spacecraft) -> [u64; STATES] {
     craft.borrow_states().map(f64::to_bits)
 }
 
-/// Simulates the craft for 2 s with each of the inputs, with steps that end at the times from `rows`. Calls `look` after
-/// each step. Returns the states at each change of the inputs.
+/// Simulates the craft with each of the `inputs` for 2 s. `rows` returns the lengths of the steps,
+/// and `look` is called after each step. Returns the bits of the states at each change of the
+/// inputs.
 fn run(
     (p, inputs, tolerance): (&Parameters, &[Inputs; 4], f64),
     mut rows: impl FnMut() -> Vec<f64>,
@@ -99,7 +100,9 @@ fn every_kind(mut test: impl FnMut((&Parameters, &[Inputs; 4], f64), usize, u64)
     }
 }
 
-/// The tanks of these random craft have limits of the slosh angle that about half of the waves exceed.
+/// The ranges of validity that are computed alone must equal the ranges among all outputs. The
+/// tanks have random limits of the slosh angle, which about half of the waves exceed, so that
+/// different ranges occur.
 #[test]
 fn after_each_row_the_discrete_outputs_computed_alone_equal_those_computed_with_all_outputs() {
     let (mut compared, mut reasons) = (0, BTreeSet::new());

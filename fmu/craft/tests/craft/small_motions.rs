@@ -125,7 +125,8 @@ fn assert_close(got: f64, want: f64, tolerance: f64) {
     assert!((got / want - 1.0).abs() < tolerance, "{got} {want}");
 }
 
-/// The results also agree with numbers of 10 to 13 digits that were computed independently of this code.
+/// The computed poles and zeros agree with their closed forms, and with numbers of 10 to 13 digits
+/// that were computed independently of this code.
 #[test]
 fn poles_and_zeros_are_the_closed_forms_with_and_without_centring_stiffness() {
     let numbers = [
@@ -175,7 +176,8 @@ fn frequency_2(tank: Tank, g: f64) -> f64 {
     -craft.directional_derivative(&u, &dx, &[0.0; INPUTS])[SLOSH_RATE]
 }
 
-/// The 382 kg of liquid move the craft of 1e11 kg a little, which changes the result by 4e-9.
+/// The tank's slosh mass of 382 kg moves the craft of 1e11 kg a little, which changes the squared
+/// frequency by the fraction 4e-9.
 #[test]
 fn a_slosh_mode_oscillates_at_the_frequency_given_as_parameter() {
     for k in [0.0, 60.0] {
@@ -196,8 +198,9 @@ fn centring_stiffness_restores_the_slosh_mass_in_weightlessness() {
     assert_close(frequency_2(tank, 0.0), 60.0 / tank.mass[0], 1e-8);
 }
 
-/// For two equal tanks at +-r and a torque about e, the squared zero is w_0^2 and the squared pole w_0^2 (1 + 2 m
-/// r^2/I_z), for any k.
+/// Two equal tanks are at +-r from the axis e of a torque. The squared antiresonance (zero) is
+/// w_0^2, the squared frequency of the mode, and the squared resonance (pole) is w_0^2 (1 + 2 m
+/// r^2/I_z), at any centring stiffness k.
 #[test]
 fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
     for (k, pole_given) in [(0.0, 9.785768250592), (30.0, 10.462710224511)] {
@@ -244,8 +247,9 @@ const K_D: f64 = 0.28;
 /// Height of the point at which the lateral force acts, above O, m.
 const ENGINE: f64 = -1.3;
 
-/// Returns the growth rate of the slosh pole, 1/s, in an attitude loop with the torque tau = -K_p theta - K_d theta', which
-/// a lateral force f at the engine exerts: tau = (z_f - center) f.
+/// Returns the growth rate of the slosh pole, 1/s, in an attitude loop, for a tank at the height
+/// `z`, m, and the drag coefficient `c`, kg/s. The loop demands the torque tau = -K_p theta - K_d
+/// theta', which a lateral force f at the engine exerts: tau = (z_f - center) f.
 fn growth(z: f64, c: f64) -> f64 {
     let p = craft_with_tank_at(z, 0.0, c);
     let closed = Closed::new(&p);
@@ -281,7 +285,7 @@ fn predicted_growth(z: f64) -> f64 {
     K_D * (zero - pole) / (2.0 * pole)
 }
 
-/// The expected growth rates, of five digits, were computed independently of this code.
+/// The expected growth rates, 1/s, with five digits, were computed independently of this code.
 #[test]
 fn the_growth_rate_of_the_slosh_pole_in_an_attitude_loop_equals_the_analytic_one() {
     for (z, expected) in [
@@ -308,8 +312,10 @@ fn root(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     low
 }
 
-/// The loop is unstable if the hinge is above the centre of mass of the rigid part R (h > 0) and the bob is below the centre of
-/// percussion of R (b < I/(M |z_f|)). The computed ends of this danger zone agree with both conditions within 1 % of its length.
+/// R is the craft without the slosh mass. The loop is unstable if the hinge is above the centre of
+/// mass of R (h > 0) and the bob is below the centre of percussion of R (b < I/(M |z_f|)); see the
+/// module's head. The computed ends of this danger zone agree with both conditions within 1 % of
+/// its length.
 #[test]
 fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
     let at = |z: f64| Closed::new(&craft_with_tank_at(z, 0.0, 0.0));
@@ -325,7 +331,8 @@ fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
     }
 }
 
-/// The loop is stable if the damping zeta_p w_p = (c/m) sigma/2 exceeds the growth rate without damping.
+/// The loop is stable if the damping of the slosh pole, zeta_p w_p = (c/m) sigma/2, exceeds the
+/// pole's growth rate without drag (symbols of the module's head).
 #[test]
 fn the_damping_that_stabilises_a_slosh_pole_is_predicted_to_5_percent() {
     for z in [0.2, 0.35, 0.5, 0.65] {

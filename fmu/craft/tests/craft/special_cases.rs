@@ -51,10 +51,10 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
 }
 
-/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes. They equal those of a craft
-/// whose liquid is rigid under a lid.
+/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of
+/// modes. They equal those of a craft without modes, in which all liquid is rigid.
 #[test]
-fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
+fn mass_centre_of_mass_and_inertia_at_rest_do_not_depend_on_the_number_of_modes() {
     let of = |modes: usize| {
         let mut p = Parameters::default();
         p.tank[0].diameter = 0.9;

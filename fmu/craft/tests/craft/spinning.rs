@@ -12,10 +12,11 @@ use super::random::{Random, draining_craft};
 
 type C = Complex<f64>;
 
-/// Each row describes a rigid body with a full spheroidal tank about the same centre. First come the body's moments of
-/// inertia A_r across its axis and C_r about it, the mass m of the liquid, kg, and the semi-axes a across and c along the
-/// axis. Then follow the rates lambda of both nutations, in body axes and divided by the rate of spin. They were computed
-/// from Poincare's equations (`fmu/craft/src/spin.rs`).
+/// Each row describes a rigid body with a full spheroidal tank about the same centre. First come
+/// the body's moments of inertia across its axis and about it, the mass of the liquid, kg, and the
+/// tank's semi-axes across the axis and along it, m. Then follow the rates of both nutations in
+/// body axes, divided by the rate of spin, as complex numbers. They were computed from Poincare's
+/// equations (`fmu/craft/src/spin.rs`).
 const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([60.0, 40.0, 30.0, 0.3, 0.2], [[-0.326391621079, 0.0], [-1.3901790763, 0.0]]),
     ([60.0, 40.0, 30.0, 0.25, 0.25], [[-1.0 / 3.0, 0.0], [-1.0, 0.0]]),
@@ -28,8 +29,10 @@ const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([50.0, 90.0, 80.0, 0.3, 0.4], [[0.783443734998, 0.0], [-0.71017527478, 0.0]]),
 ];
 
-/// Returns a craft that rotates about its z axis at `rate`, rad/s. `decay` is the decay rate of the
-/// liquid's spin by friction.
+/// Returns a craft with a full spheroidal tank that rotates about its z axis at `rate`, rad/s. The
+/// first five numbers are the craft's moments of inertia across the z axis and about it, the mass
+/// of the liquid, and the tank's semi-axes across the z axis and along it. `decay` are the decay
+/// rates of the liquid's spin by friction, 1/s.
 fn spheroid([across, axial, m, a, c]: [f64; 5], rate: f64, decay: [f64; 2]) -> Parameters {
     let mut p = Parameters::default();
     let j = Inertia { xx: across, yy: across, zz: axial, xy: 0.0, xz: 0.0, yz: 0.0 };
@@ -90,8 +93,9 @@ fn craft_with_full_spheroids_nutate_at_the_rates_of_poincare() {
     }
 }
 
-/// Returns the rates lambda that solve (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda + (A - C) C' = 0. If the
-/// liquid has friction, C' is replaced by C' - i K/Omega.
+/// Returns the coefficients of lambda^2, lambda and 1 in the equation of the nutation rates lambda:
+/// (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda + (A - C) C' = 0. If the liquid has
+/// friction, `by_friction` = -i K/Omega is added to C'.
 fn closed_form([across, axial, m, a, c]: [f64; 5], by_friction: C) -> [C; 3] {
     let (inner, whole) = (m * (a * a + c * c) / 5.0, 2.0 * m * a * a / 5.0);
     let shared = 2.0 * m * a * c / 5.0;
@@ -124,9 +128,10 @@ fn friction_in_full_spheroids_changes_nutation_as_the_closed_form_says() {
     }
 }
 
-/// By Rumyantsev's criterion a craft is stable if lambda is real. In an unstable craft a nutation of 1e-7 rad/s at least
-/// doubles in the time in which the closed form predicts a growth by a factor of 1,000. In a stable craft its amplitude
-/// stays within the beat of the two nutations.
+/// By Rumyantsev's criterion a spinning craft is stable if the rates of both nutations are real. In
+/// an unstable craft a nutation of 1e-7 rad/s at least doubles in the time in which the closed form
+/// predicts a growth by a factor of 1,000. In a stable craft its amplitude stays within the beat of
+/// the two nutations.
 #[test]
 fn spinning_craft_are_stable_exactly_where_rumyantsevs_criterion_holds() {
     let mut random = Random::new(2);
@@ -164,9 +169,11 @@ fn spinning_craft_are_stable_exactly_where_rumyantsevs_criterion_holds() {
     assert!(stable > 5 && unstable > 5, "{stable} {unstable}");
 }
 
-/// Each row contains h/R, Omega^2 R/g, C and K of an upright cylinder with R = 1 m under g = 1 m/s2. C and K are fitted to
-/// the frequencies of the first mode in the equations of a rotating liquid for every Omega, seen from the tank. Then follow
-/// both frequencies, against the spin and with it, rad/s, and the largest errors of C_0 and K = omega_0^2, per cent.
+/// Each row describes an upright cylinder with R = 1 m under g = 1 m/s2. First come h/R, Omega^2
+/// R/g, and the gyroscopic coefficient C and the stiffness K of the first mode. C and K are fitted
+/// to the frequencies of this mode, seen from the tank, in the equations of a rotating liquid. Then
+/// follow both frequencies, against the spin and with it, rad/s. The last numbers are the errors of
+/// both frequencies, per cent, with the formulas C_0 and K = omega_0^2 instead of the fit.
 const CYLINDERS: [([f64; 4], [f64; 2], [f64; 2]); 6] = [
     ([0.25, 0.1, 0.75653, 0.82912], [1.1806962, -0.702227], [0.8, 3.8]),
     ([0.5, 0.1, 0.65208, 1.35843], [1.3898245, -0.9774112], [0.2, 1.4]),
@@ -176,9 +183,10 @@ const CYLINDERS: [([f64; 4], [f64; 2], [f64; 2]); 6] = [
     ([2.0, 0.3, 0.41797, 1.90865], [1.6293091, -1.1714488], [1.4, 2.4]),
 ];
 
-/// Each row contains h/R, Omega^2 R/g, the factor lambda, and the real and the imaginary part of the force on the tank, divided
-/// by its lateral acceleration, kg. The acceleration is proportional to exp(-i l t) with l = (lambda - i/20) Omega. The forces
-/// were computed from the equations of a rotating liquid, for the same liquids as above.
+/// Each row contains h/R, Omega^2 R/g, the factor lambda, and the real and the imaginary part of a
+/// force, kg: the force of the liquid on the tank divided by the tank's lateral acceleration. The
+/// acceleration is proportional to exp(-i l t) with l = (lambda - i/20) Omega. The forces were
+/// computed from the equations of a rotating liquid, for the cylinders in [`CYLINDERS`].
 const FORCES: [[f64; 5]; 48] = [
     [1.0, 0.1, -3.0, 6.90214, 0.32358],
     [1.0, 0.1, -2.5, 4.98723, 0.11426],
@@ -230,8 +238,10 @@ const FORCES: [[f64; 5]; 48] = [
     [0.5, 0.3, 3.0, -4.19429, -2.11511],
 ];
 
-/// Returns a cylinder whose liquid rotates with it, and its inputs. `c` is the coefficient C of the first mode, and
-/// `stiffness` is (K - omega_0^2)/Omega^2.
+/// Returns a cylindrical tank of radius R = 1 m whose liquid spins with the tank at the rate Omega,
+/// and its inputs. `fill` is the depth h/R, and `beta` is Omega^2 R/g. `c` is the gyroscopic
+/// coefficient C of the first mode. `stiffness` is (K - omega_0^2)/Omega^2, the increase of the
+/// mode's stiffness K by the spin, where omega_0 is the natural frequency without spin.
 fn cylinder(fill: f64, beta: f64, c: f64, stiffness: f64) -> (TankParameters, TankInputs) {
     let mut p = TankParameters::default();
     p.tank = Tank {
@@ -265,7 +275,8 @@ fn lateral(p: &TankParameters, u: &TankInputs) -> [C; 6] {
     at
 }
 
-/// Returns the frequencies l of both waves, against the spin and with it; z is proportional to exp(-i l t).
+/// Returns the frequencies l of both waves, against the spin and with it. In a wave the bob's
+/// displacement z = p_x + i p_y is proportional to exp(-i l t).
 fn waves(p: &TankParameters, u: &TankInputs) -> [f64; 2] {
     let [z, z_d, ..] = lateral(p, u);
     let mut waves = roots(C::from(1.0), -z_d, -z).map(|sigma| {
@@ -335,8 +346,9 @@ fn lateral_forces_of_spinning_cylinders_are_those_of_the_rotating_liquid() {
     }
 }
 
-/// At h/R = 1 the coefficient C_0 is 0.496. The tank is then out of range above 2 Omega/omega_0 = 0.818, which is a spin of
-/// 0.541 rad/s here. Only the rate of the liquid's spin matters, not the rate of the tank.
+/// At h/R = 1 the gyroscopic coefficient C_0 is 0.496. The tank is therefore out of range above 2
+/// Omega/omega_0 = 0.818, which is a spin of 0.541 rad/s here. Only the rate of the liquid's spin
+/// matters, not the rate of the tank.
 #[test]
 fn the_spin_of_the_liquid_and_not_of_its_tank_limits_the_range() {
     let squared = 1.8411837813 * f64::tanh(1.8411837813);

@@ -21,8 +21,9 @@ fn resting(tank: Tank) -> (SloshTank, TankInputs) {
     (SloshTank::new(&p, &u, 0.0, 1e-12).unwrap(), u)
 }
 
-/// The frequency changes by the relative amount (3 kappa/8 - s/2) A^2 in planar motion and (kappa/2) A^2 in circular motion.
-/// The remaining difference is of the fourth order: it falls by a factor of 16 if A is halved.
+/// If a wave has the amplitude A, the coefficients s and kappa change its frequency by the relative
+/// amount (3 kappa/8 - s/2) A^2 in planar motion and (kappa/2) A^2 in circular motion. The
+/// remaining difference is of the fourth order: it falls by a factor of 16 if A is halved.
 #[test]
 fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
     for (s, kappa) in [(1.0, 1.0), (1.408, 0.734), (1.0, 8.0), (-3.0, 0.5), (1.0, 0.25), (0.0, 1.0)]
@@ -119,9 +120,10 @@ fn coefficients_near_one_move_as_a_pendulum() {
     }
 }
 
-/// With s = -6 the inertia along the meridian falls to half of a pendulum's at 16.1 degrees.
+/// With s = -6 the bob's inertia along the meridian of its surface falls to half of a pendulum's
+/// inertia at 16.1 degrees, where the model ends.
 #[test]
-fn angles_at_which_the_inertia_vanishes_are_refused() {
+fn slosh_angles_at_which_a_bob_has_too_little_inertia_are_refused() {
     let mut tank = bench(1.227);
     tank.nonlinear_inertia[0] = -6.0;
     tank.nonlinear_stiffness[0] = 1.0;
@@ -197,7 +199,8 @@ fn large_wave_coefficients_are_refused_out_of_range_and_with_detached_liquid() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// For s = 0 a bob at 45 degrees reduces the inertia of the craft by a third of its own mass.
+/// For s = 0 (`nonlinear_inertia`) a bob at 45 degrees reduces the inertia of the craft by a third
+/// of its own mass, so that a craft with 0.3 times this mass is refused.
 #[test]
 fn a_craft_too_light_for_its_coefficients_is_refused() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
@@ -423,9 +426,10 @@ fn a_wave_is_unchanged_in_a_tank_that_turns_about_its_axis() {
     }
 }
 
-/// At 20.7 degrees the inertia of rotary motion, 1 - 4 u, is half of a pendulum's, so that the model ends.
+/// At 20.7 degrees the inertia of rotary motion, 1 - 4 u with the squared sine u of the slosh
+/// angle, falls to half of a pendulum's inertia, so that the model ends there.
 #[test]
-fn angles_at_which_the_inertia_of_rotary_motion_vanishes_are_refused() {
+fn slosh_angles_at_which_rotary_motion_has_too_little_inertia_are_refused() {
     let mut tank = bench(1.227);
     (tank.rotary_inertia[0], tank.nonlinear_inertia[0]) = (-4.0, 1.0);
     tank.p_0[0] = [0.36, 0.0, -f64::sqrt(1.0 - 0.36 * 0.36)];

@@ -106,8 +106,10 @@ fn rates_per_torque(p: &Parameters, frequency: f64) -> [Complex<f64>; 3] {
     [0, 1, 2].map(|i| x[index::OMEGA + i])
 }
 
-/// With products of inertia, and springs about x and y, w_x (k_x - I_xx s^2) = I_xz s^2 w_z holds about x, where s is the angular
-/// frequency, and the analogous equation about y. The leakage (Rubaga's thesis, section 6.3.6) is sqrt(w_x^2 + w_y^2)/w_z.
+/// The platform has products of inertia and rests on springs of the stiffness k_x about x and k_y
+/// about y. At the angular frequency s, its rates fulfil w_x (k_x - I_xx s^2) = I_xz s^2 w_z, and
+/// the analogous equation with w_y. The leakage is the rate across the axis divided by the rate
+/// about it, sqrt(w_x^2 + w_y^2)/w_z (Rubaga's thesis, section 6.3.6).
 #[test]
 fn products_of_inertia_couple_the_rotation_of_a_platform_into_its_tilt() {
     let mut p = platform();
@@ -127,8 +129,9 @@ fn products_of_inertia_couple_the_rotation_of_a_platform_into_its_tilt() {
     }
 }
 
-/// If the centre of mass is at a distance d from the axis, gravity couples rotation and tilt as well: at rest the platform is
-/// tilted by M g d/(k - M g h).
+/// If the centre of mass of the platform is at a distance d from the axis, gravity tilts the
+/// platform at rest by M g d/(k - M g h), where M is the mass, h the height of the centre of mass,
+/// and k the stiffness of the pivot.
 #[test]
 fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     let mut p = platform();
@@ -144,8 +147,9 @@ fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     assert!(out.omega.iter().all(|w| w.abs() < 1e-9));
 }
 
-/// Platform and bob form a double pendulum: (K - omega^2 M)(theta, phi) = 0 with the bob at z theta + l phi, M = [[I + m
-/// z^2, m z l], [m z l, m l^2]] and K = diag(k - g (M h + m z), m g l).
+/// Platform and bob form a double pendulum with the angles theta of the platform and phi of the
+/// rod. The bob is at z theta + l phi. For the natural frequencies omega, (K - omega^2 M)(theta,
+/// phi) = 0 with M = [[I + m z^2, m z l], [m z l, m l^2]] and K = diag(k - g (M h + m z), m g l).
 #[test]
 fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
     let mut p = platform();
@@ -174,9 +178,10 @@ fn liquid_on_a_tilting_platform_swings_as_a_double_pendulum() {
     }
 }
 
-/// A stiffer pivot approaches HubSlosh's hub, which only rotates about its axis: the difference falls as 1/k.
+/// A platform on a stiff pivot moves almost like the hub in the FMU HubSlosh, which rotates about
+/// one axis only. The difference falls as 1/k, where k is the stiffness of the pivot.
 #[test]
-fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
+fn a_platform_on_a_stiff_pivot_moves_as_a_hub_that_rotates_about_one_axis() {
     let u = Inputs { torque: Ramp::held([0.0, 0.0, 0.05]), ..Inputs::default() };
     let turned = |k: f64| {
         let mut p = platform();
@@ -200,8 +205,9 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
     assert!((ratio - 10.0).abs() < 0.5, "{ratio} {soft:e} {stiff:e}");
 }
 
-/// If the rate is far above eps, the smoothed sign of the rate is 1 to the last bit, so that I w' = -C with the Coulomb
-/// torque C until the platform stops. From 2 rad/s it stops after 2 I/C = 16 s.
+/// If the platform's rate w is far above `eps`, the width of the smoothed sign function, the
+/// friction torque equals the Coulomb torque C to the last bit, so that I w' = -C until the
+/// platform stops. From 2 rad/s it stops after 2 I/C = 16 s.
 #[test]
 fn coulomb_friction_stops_a_platform_and_holds_it() {
     let mut p = platform();
@@ -276,10 +282,11 @@ fn pivot_parameters_do_not_change_a_free_craft() {
     );
 }
 
-/// The platform is the bench of book/tilting.md. The test computes the root mean square of the leakage from 1.25 to 3.5 Hz by
-/// linear equations. With a damping ratio of 0.03 `hubslosh analyse` finds 0.0419 from the rates of a sweep at 0.0125 N m.
-/// With a damping ratio of 0.003 it finds 0.125 instead of 0.135, because a sweep smooths the tip of the antiresonance, which
-/// is 0.014 Hz wide.
+/// The platform has the data of the bench in book/tilting.md. The leakage is the rate across the
+/// axis divided by the rate about it; the test computes its root mean square from 1.25 to 3.5 Hz by
+/// linear equations. With a damping ratio of 0.03 `hubslosh analyse` finds 0.0419 from the rates of
+/// a sweep at 0.0125 N m. With a damping ratio of 0.003 it finds 0.125 instead of 0.135, because a
+/// sweep smooths the tip of the antiresonance, which is 0.014 Hz wide.
 #[test]
 fn the_leakage_of_the_books_platform_equals_that_of_its_linear_equations() {
     let j = Inertia { xx: 0.22, yy: 0.25, zz: 0.304, xy: 0.0, xz: 0.004, yz: -0.006 };

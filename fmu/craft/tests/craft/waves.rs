@@ -13,8 +13,8 @@ pub const G: f64 = 9.80665;
 
 pub const TOLERANCE: f64 = 1e-12;
 
-/// Returns the bench's tank of 81.5 mm radius, filled to a depth of `fill` radii, with only its first mode and with the
-/// coefficients of potential flow.
+/// Returns a cylindrical tank of 81.5 mm radius that is filled to a depth of `fill` radii, with
+/// only its first mode and with the coefficients of potential flow.
 pub fn bench(fill: f64) -> Tank {
     let (d, h) = (0.163, 0.0815 * fill);
     let pendulum = cylinder::pendulum(0, d, h, 2.083);
