@@ -121,16 +121,17 @@ impl Mode {
         }
     }
 
-    /// Returns w.(D w) of this mode, where w is the craft's angular velocity. `ww` has the products xx, yy, zz, xy, xz, yz
-    /// of the components of w.
+    /// Returns w.(D w) of this mode, where w is the craft's angular velocity and D the derivative
+    /// of the craft's inertia by the displacement of the mode. `ww` has the products xx, yy, zz,
+    /// xy, xz, yz of the components of w.
     fn turning<T: Number>(&self, ww: Symmetric<T>) -> T {
         let [xx, yy, zz, xy, xz, yz] = self.growth;
         ww[0] * xx + ww[1] * yy + ww[2] * zz + (ww[3] * xy + ww[4] * xz + ww[5] * yz) * 2.0
     }
 
     /// Returns the part of -eta'' of this mode that does not depend on the craft's accelerations a
-    /// and w': damping, stiffness and the centrifugal term. `turning` is w.(D w), which determines
-    /// the centrifugal term (symbols of the module's head).
+    /// and w': damping, stiffness and the centrifugal term. `turning` is the result of
+    /// `Mode::turning`, from which the centrifugal term follows.
     fn pull<T: Number>(&self, eta: T, rate: T, turning: T) -> T {
         rate * self.damping + eta * self.stiffness - turning * 0.5
     }
@@ -491,9 +492,10 @@ impl Flexing {
         [force, torque]
     }
 
-    /// Returns the directional derivatives of two loads of the appendages on the craft while w' is
-    /// constant: w' x y + w x K and D w' + (sum of D eta') w, with the symbols of the module's
-    /// head.
+    /// Returns the directional derivatives of the force w' x y + w x K and of the torque D w' +
+    /// (sum of D eta') w by the deflected appendages, while the angular acceleration w' is
+    /// constant. By the deflections y is the first moment of the craft, K its rate, and D the
+    /// change of the inertia.
     fn rates_along(&self, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         let [slope, slope_1] =
             [0, 1].map(|n| self.structure.growth(&self.coefficients(&self.rate, n)));

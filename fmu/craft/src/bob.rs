@@ -357,9 +357,8 @@ impl Bob {
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// Returns the force of the bob on the craft and its torque about O if the accelerations a and
-    /// w' are 0. The tension of the rod is then T_0 = m (l |v|^2 - p.(w x (w x P))) - k l
-    /// |p_perp|^2 (symbols of the module's head).
+    /// Returns the force of the bob on the craft and its torque about O, for the craft's angular
+    /// velocity `w`, if the specific force a at O and the angular acceleration w' are 0.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));

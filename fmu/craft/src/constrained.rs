@@ -166,10 +166,10 @@ impl HigherSeries {
         self.m = [-q[1], q[0], 0.0];
     }
 
-    /// Computes coefficient `n` of the terms beyond the third order in the force f (symbols of the
-    /// module's head). `r` and `u` must be known up to order n + 1, `r_d` (the rate r') and `w_e`
-    /// up to order n. Returns the sum of the terms that do not contain the accelerations [a; w'] of
-    /// order n.
+    /// Computes coefficient `n` of the force of the bob's terms beyond the third order, divided by
+    /// m l. The position `r` and the squared displacement `u` must be known up to order n + 1, the
+    /// rate `r_d` and the angular velocity `w_e` about the tank's axis up to order n. Returns the
+    /// part that does not contain the craft's accelerations of order n.
     #[inline(never)]
     fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
         let HigherSeries { by, .. } = *self;
@@ -254,16 +254,16 @@ impl HigherSeries {
         self.share * (self.known[2] + dot(self.m, y) + w_e_d * u)
     }
 
-    /// Sets coefficient n of D and P', the factors of q and e x q in the force of the terms beyond
-    /// the third order (symbols of the module's head). `inner` is S sigma' and `pull` is T tau' of
-    /// the newest order.
+    /// Sets coefficient `n` of the force of the terms beyond the third order: D along the bob's
+    /// displacement across the tank's axis, and P' perpendicular to it. `inner` and `pull` are the
+    /// parts S sigma' and T tau' of D and P' (module's head) at the newest order.
     fn set(&mut self, n: usize, inner: f64, pull: f64) {
         (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
     }
 
-    /// Returns coefficient n of the vector (u P)' e + u P w x e (symbols of the module's head).
-    /// Multiplied by -m l^2 it is the torque on the craft that the mode's terms beyond the third
-    /// order exert. `pull` is the part T tau' of P' of order n.
+    /// Returns coefficient `n` of the torque that the mode's terms beyond the third order exert on
+    /// the craft, divided by -m l^2 (torque in the module's head). `w` is the angular velocity, `u`
+    /// the squared displacement of the bob, and `pull` the part T tau' of order n.
     fn couple(&self, n: usize, pull: f64, w: &Vector, u: &Series) -> Vec3 {
         let mut couple = [0.0, 0.0, u[0] * (self.known[1] + pull)];
         for j in 0..n {
@@ -723,10 +723,9 @@ impl ConstrainedBob {
         largest(self.v[n])
     }
 
-    /// Updates the rate r' of the bob after an impulse that changes the velocity of O by `dv` and
-    /// the angular velocity by `dw`, both in body axes. The product l r' changes by -(1 - H)(dv +
-    /// dw x rho), with the matrix H of the module's head. `x` has the bob's six states at the start
-    /// of the expansion.
+    /// Updates the rate of the bob after an impulse that changes the velocity of O by `dv` and the
+    /// angular velocity by `dw`, both in body axes. The bob keeps its velocity in the directions in
+    /// which its surface lets it move. `x` has the bob's six states at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
         let mut change = scale(-self.inv_l, sub(kick, self.held(kick)));

@@ -462,7 +462,8 @@ impl<T: Number> OnSurface<T> {
     }
 
     /// Returns the torque that the mode's rotary motion exerts on the craft about the tank's axis,
-    /// divided by the bob's mass. `slid` is the vector -l y with the symbols of `surface.rs`.
+    /// divided by the bob's mass. `slid` is -l times the part of p'' that is perpendicular to the
+    /// bob's direction p, and `w_d` is the craft's angular acceleration.
     fn couple(&self, slid: Vec3<T>, w_d: Vec3<T>) -> Option<Vec3<T>> {
         let (rotary, n) = (self.rotary.as_ref()?, self.meridian.around()?);
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
@@ -668,8 +669,9 @@ impl<T: Number> Contents<'_, T> {
         ];
     }
 
-    /// Adds the inertia of the bobs to the lower triangle of the craft's mass matrix: m u u^T along each rod. A planar mode
-    /// also has inertia perpendicular to its plane.
+    /// Adds the inertia of the bobs to the lower triangle of the craft's mass matrix. A pendulum's
+    /// bob has inertia only along its rod, and the bob of a planar mode also perpendicular to its
+    /// plane.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
             if let Some(surface) = &bob.surface {

@@ -476,8 +476,9 @@ impl Lump {
         [x_d[0], x_d[1], x_d[2], x_dd[0], x_dd[1], x_dd[2]]
     }
 
-    /// Returns the scale, m/s, to which the allowed error of the detached liquid's velocity u is relative: its speed,
-    /// estimated over the next `t` seconds.
+    /// Returns an estimate of the speed of the detached liquid over the next `t` seconds, m/s, to
+    /// which the allowed error of its velocity u is relative. `w` is the angular velocity of the
+    /// craft.
     pub fn speed_scale(&self, w: Vec3, t: f64) -> f64 {
         largest(self.x_d[0]) + self.half * largest(w) + largest(self.u[1]) * t
     }

@@ -83,7 +83,8 @@ impl<T: Number> Rigid<T> {
         sum
     }
 
-    /// Returns the mass matrix M for the unknowns a, w'.
+    /// Returns the mass matrix of the body, which maps the acceleration a of O and the angular
+    /// acceleration w' to the force and the torque about O.
     pub fn mass_matrix(&self) -> Mat6<T> {
         let [x, y, z] = self.moment;
         let [i_x, i_y, i_z] = self.inertia;

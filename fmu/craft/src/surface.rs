@@ -122,8 +122,10 @@ impl Higher {
         Higher { gyroscopic: [0.0; 2], ..*self } != Higher::default()
     }
 
-    /// Returns the reaction of this mode on the spinning liquid, (1 - C) tau + epsilon W u. The mode contributes m l^2 times
-    /// this value to I_zz s_z, the moment of inertia of the liquid about the tank's axis times its slip (`spin.rs`).
+    /// Returns the reaction of this mode on the spinning liquid, (1 - C) tau + epsilon W u, from
+    /// the rate of rotary motion `tau` and from `turned` = W u, the spin rate times the squared
+    /// displacement. The mode contributes m l^2 times this value to the liquid's moment of inertia
+    /// about the tank's axis times its slip (`spin.rs`).
     pub fn reaction<T: Number>(&self, tau: T, turned: T) -> T {
         tau * self.gyroscopic[0] + turned * self.gyroscopic[1]
     }
@@ -244,9 +246,9 @@ impl Surface {
     }
 
     /// Returns the largest mass by which the bob can reduce the craft's inertia in one direction,
-    /// divided by the bob's mass. The result is between 0 and 1. It is minus the smallest
-    /// eigenvalue of N (module's head) at slosh angles up to 45 degrees, or up to the angle at
-    /// which the model ends.
+    /// divided by the bob's mass, from 0 to 1. Slosh angles up to 45 degrees, or up to the end of
+    /// the model, are included. The result is minus the smallest eigenvalue of the matrix N in the
+    /// module's head.
     pub fn inertia_reduction(&self) -> f64 {
         let at = |k: u32| {
             let u = 0.5 * f64::from(k) / 64.0;
@@ -577,16 +579,17 @@ impl<T: Number> Meridian<T> {
 }
 
 impl<T: Number> Rotary<T> {
-    /// Returns the term l T u w_e' of the force per mass, which acts along n (symbols of the
-    /// module's head). `rate_d` is w_e' = e.w', the angular acceleration about the tank's axis.
+    /// Returns the force of rotary motion, per mass of the bob, that the angular acceleration
+    /// `rate_d` of the craft about the tank's axis causes. It acts across the tank's axis,
+    /// perpendicular to the bob's displacement.
     pub fn pull(&self, rate_d: T) -> T {
         self.lever * rate_d
     }
 
     /// Returns the torque that the mode's rotary motion exerts on the craft about the tank's axis
-    /// `e`, divided by the bob's mass, in addition to the moment of the bob's force. `slid` is
-    /// n.(-l y) with the symbols of the module's head, and `rate_d` is the craft's angular
-    /// acceleration e.w' about the axis.
+    /// `e`, divided by the bob's mass, in addition to the moment of the bob's force. `slid` is -l
+    /// n.p'', where l is the pendulum length, p'' the second derivative of the bob's direction, and
+    /// n = e x p. `rate_d` is the craft's angular acceleration e.w' about the axis.
     pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
         let tau_d = self.l * self.u * rate_d + self.turning - slid;
         let along = self.l * self.u * (self.inertia * tau_d + self.growing) + self.swept;

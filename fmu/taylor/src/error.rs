@@ -54,8 +54,8 @@ impl core::fmt::Display for StepError {
 impl core::error::Error for StepError {}
 
 impl StepError {
-    /// Returns the same error with `begin`, s, added to its time. A time since the start of a stretch thus becomes a time
-    /// since the start of the call.
+    /// Returns the same error with `begin`, s, added to its time. A time since the start of a part
+    /// of a call thus becomes a time since the start of the call.
     pub fn delayed(mut self, begin: f64) -> StepError {
         if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
             *time += begin;

@@ -63,7 +63,8 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Creates a counter for at most `max` steps. `advice` is for the user if they are not enough.
+    /// Creates a counter for at most `max` steps. `advice` is the end of the error message if more
+    /// steps are needed, and states what the user can change.
     pub const fn new(max: usize, advice: &'static str) -> Steps {
         Steps { taken: 0, max, advice }
     }

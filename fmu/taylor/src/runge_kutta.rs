@@ -300,8 +300,9 @@ fn try_step<const D: usize, const S: usize>(
     Some((now, method.margin * error * (error / libm::hypot(error, 0.1 * second))))
 }
 
-/// Step control of a call, which is carried from one stretch to the next: length `h`, s, of the next step, counter of the
-/// `steps` that were tried, and true if a step of [`SHORT`] was rejected.
+/// Step control of a call, which is kept if the call consists of several integrations by
+/// [`advance`]: length `h`, s, of the next step, counter of the `steps` that were tried, and true
+/// if a step of [`SHORT`] was rejected.
 pub struct Pace {
     steps: Steps,
     h: f64,

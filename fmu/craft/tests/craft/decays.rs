@@ -20,8 +20,9 @@ fn tank(angle: f64) -> Tank {
     tank
 }
 
-/// Returns p_x and its rate after each `period`, under the acceleration `g` along the tank: first for the single tank, then for
-/// the tank in a craft of 1e9 kg.
+/// Returns p_x, the bob's displacement over the pendulum length, and its rate after each of `count`
+/// periods of `period` seconds, under the acceleration `g` along the tank. The first list is for
+/// the single tank, the second for the tank in a craft of 1e9 kg.
 fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2] {
     let p = TankParameters { tank: *tank, ..TankParameters::default() };
     let motion = TankInputs { a: Ramp::held([0.0, 0.0, g]), ..TankInputs::default() };

@@ -69,8 +69,8 @@ fn flat_tank(out: &SloshTankOutputs) -> Vec<f64> {
     all
 }
 
-/// Returns central differences with Richardson's extrapolation. Their errors, of the orders step^4 and 1e-16/step, are about
-/// 1e-10 of the quantity and of its curvature.
+/// Returns the derivative of `f` at 0 from central differences of the fourth order. The errors, of
+/// the orders step^4 and 1e-16/step, are about 1e-10 of `f` and of its curvature.
 fn difference(f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     let step = 5e-4;
     let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|s| f(s * step));

@@ -63,9 +63,9 @@ fn errors_stay_within_the_solver_tolerance() {
     }
 }
 
-/// In a craft at rest the allowed error of a step, which is relative to the size of the motion, starts at 0 and grows. The
-/// craft is accelerated by 1 rad/s2, so that a bob with high centring stiffness, too light to affect the craft, begins to
-/// swing at 10 rad/s.
+/// The allowed error of a step is relative to the size of the motion, which starts at 0 in a craft
+/// at rest. The craft is accelerated by 1 rad/s2, so that a bob with high centring stiffness, too
+/// light to affect the craft, begins to swing at 10 rad/s.
 #[test]
 fn errors_stay_within_the_solver_tolerance_from_rest() {
     let mut p = Parameters::default();

@@ -194,8 +194,8 @@ fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_posi
     assert!(p.problems()[0].starts_with("tank[1].direction[2] = "), "{:?}", p.problems());
 }
 
-/// A craft of 10 kg has a box whose m_0 is -120 kg. While the bobs hang at rest their masses make the mass matrix regular, but if
-/// both swing by 90 degrees, it is singular.
+/// A craft of 10 kg has a box whose rigid liquid has the mass -120 kg. While the bobs hang at rest
+/// their masses make the mass matrix regular, but if both swing by 90 degrees, it is singular.
 #[test]
 fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_allowed() {
     let light = |mass: f64| {

@@ -97,8 +97,9 @@ fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f
     [rate[PITCH_RATE], rate[SLOSH_RATE]]
 }
 
-/// Returns three numbers: the squared pole, the damping 2 zeta_p w_p, and the squared zero of theta for the input in
-/// whose direction `du` points.
+/// Returns three numbers of the linearised craft: the squared frequency of the slosh pole, the
+/// pole's damping 2 zeta_p w_p, and the squared frequency of the zero in the response of the pitch
+/// angle theta to inputs in the direction `du`.
 fn pole_and_zero(p: &Parameters, du: [f64; INPUTS]) -> [f64; 3] {
     let mut craft = Spacecraft::new(p, &inputs(), 0.0, 1e-9).unwrap();
     let [alpha, gamma] = column(&mut craft, Some(SLOSH), [0.0; INPUTS]);
@@ -278,7 +279,9 @@ fn growth(z: f64, c: f64) -> f64 {
     poles.iter().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap().re
 }
 
-/// Returns the growth rate to first order in the gains: K_d (w_z^2 - w_p^2)/(2 I w_p^2).
+/// Returns the growth rate of the slosh pole in an attitude loop, 1/s, for a tank at the height
+/// `z`, to first order in the gains: K_d (w_z^2 - w_p^2)/(2 I w_p^2) with the frequencies w_p of
+/// the pole and w_z of the zero.
 fn predicted_growth(z: f64) -> f64 {
     let closed = Closed::new(&craft_with_tank_at(z, 0.0, 0.0));
     let (zero, pole) = (closed.zero_of_force(ENGINE - closed.center), closed.pole());

@@ -300,9 +300,10 @@ const DIFFERENCES: [(f64, f64); 6] = [
     (-3.0, -1.0 / 60.0),
 ];
 
-/// The motion of a tank's bobs fulfils Lagrange's equations d(dL/dq')/dt = dL/dq, where the derivatives are computed by
-/// differences of L and along the motion. Either the liquid flows so fast that s' and kappa' matter, or the modes have
-/// coefficients beyond the third order.
+/// The motion of a tank's bobs fulfils Lagrange's equations, d(dL/dq')/dt = dL/dq, for a Lagrangian
+/// L whose derivatives are computed by finite differences. In some tanks the liquid flows so fast
+/// that the changes of s and kappa matter. In the others the modes have coefficients beyond the
+/// third order.
 #[test]
 fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
     for seed in 0..36 {
