@@ -910,8 +910,7 @@ mod tests {
     /// A step of 50 s is too long for the highest order. It is shortened until the larger of the
     /// last two terms equals its allowed error.
     #[test]
-    fn a_step_too_long_for_the_highest_order_is_shortened_until_the_last_two_terms_are_small_enough()
-     {
+    fn a_step_too_long_for_the_highest_order_is_shortened_to_the_allowed_error() {
         for highest in [10, ORDER] {
             let mut motion = Oscillator { highest, ..Oscillator::new(Convergence::Decay) };
             motion.start(0.0);

@@ -404,7 +404,6 @@ fn the_motion_of_detached_liquid_does_not_depend_on_the_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
 }
 
-/// Detached liquid under 200 random histories of thrust moves in the same way with every communication step.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_communication_step() {

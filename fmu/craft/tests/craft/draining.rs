@@ -139,8 +139,6 @@ fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
     }
 }
 
-/// The remaining mass is the initial mass minus the integral of the flow, and the motion is the same for
-/// steps of any length.
 #[test]
 fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     let (p, mut u) = draining_craft(7, 2);
@@ -226,8 +224,6 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
     }
 }
 
-/// Without flow the equations of a draining tank give the same motion as the equations of a tank with constant mass,
-/// for every damping law.
 #[test]
 fn a_fill_table_without_outflow_does_not_change_the_motion() {
     for seed in 0..4 {

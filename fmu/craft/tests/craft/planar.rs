@@ -174,8 +174,6 @@ fn options_of_axisymmetric_tanks_are_refused_together_with_options_of_asymmetric
     assert!(p.problems()[0].starts_with(names));
 }
 
-/// Rigid liquid of negative mass is allowed only with planar modes, and only if craft and liquid
-/// together have positive inertia.
 #[test]
 fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_positive() {
     let mut p = craft(a_box());

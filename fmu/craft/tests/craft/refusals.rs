@@ -214,7 +214,6 @@ fn a_slosh_frequency_without_a_valid_pendulum_length_is_refused() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// The mass of liquid must increase from point to point, and must be at least the sum of the modal masses.
 #[test]
 fn the_masses_in_a_fill_table_must_increase_and_include_the_modal_masses() {
     let with = |change: fn(&mut Tank)| {

@@ -51,8 +51,6 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
 }
 
-/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of
-/// modes. They equal those of a craft without modes, in which all liquid is rigid.
 #[test]
 fn mass_centre_of_mass_and_inertia_at_rest_do_not_depend_on_the_number_of_modes() {
     let of = |modes: usize| {

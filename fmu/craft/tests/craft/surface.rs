@@ -491,7 +491,6 @@ fn a_fill_table_with_constant_s_and_kappa_moves_as_a_tank_with_these_values() {
     }
 }
 
-/// At a point of its fill table and without flow, a tank has the same rates as a tank with the coefficients of this point.
 #[test]
 fn a_tank_at_a_point_of_its_table_has_the_coefficients_of_this_point() {
     let mut random = Random::new(5);
