@@ -1045,7 +1045,13 @@ def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 def page(rows: list[Row]) -> str:
     """Return the page: the template filled with the results."""
     results = markdown(
-        ("experiment", "quantity", "measured ± its error", "computed ± its band", "result"),
+        (
+            "experiment",
+            "quantity",
+            "measured ± its error",
+            "computed ± its band",
+            "result (empty: pass)",
+        ),
         [
             (
                 # print the name of an experiment only in its first row
