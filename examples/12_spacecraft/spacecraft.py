@@ -24,10 +24,7 @@ slew = attitude.slew(np.radians(30), DURATION, axis=(0, 0, 1), inertia=J)
 
 
 def after_slew(values: dict, loop: hubslosh.Loop = loop) -> dict[str, float]:
-    """Return what the pointing error is after the slew, for one draw of parameters.
-
-    The two results are its largest value (deg) and the time after which it stays below 0.1° (s).
-    """
+    """Return the largest error after the slew (deg), and the time (s) until it stays below 0.1°."""
     run = loop.simulate(300, values, reference=slew, outputs=attitude.NAMES)
     error = np.degrees(np.linalg.norm(attitude.error(run, slew.iloc[-1:]), axis=1))
     settled = run["time"][error > 0.1].max() - DURATION

@@ -330,7 +330,7 @@ def test_units_of_a_parameter_set_are_converted(
             "",
             "min cannot be converted to m",
         ),
-        (parameter("friction.model", "1", "m", "Integer"), "", "has no unit"),
+        (parameter("friction.model", "1", "m", "Integer"), "", "and no unit"),
         (parameter("tank.h", "50 mm"), "", "allowed: a value of type Real"),
         (parameter("gyro.on", "yes", kind="Boolean"), "", "allowed: a value of type Boolean"),
         (
