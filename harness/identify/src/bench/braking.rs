@@ -15,7 +15,7 @@ use crate::tuning::PAGE_POINTS;
 
 /// Smallest number of stretches (parts of a decay within one revolution). The uncertainty of the five coefficients of [`Braking`]
 /// is computed from the scatter between stretches.
-pub(crate) const LEAST_STRETCHES: usize = 10;
+pub const LEAST_STRETCHES: usize = 10;
 
 /// Friction measured at one rate: mean of the torque minus inertia times acceleration, over rows of similar rate.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -386,7 +386,10 @@ mod tests {
     fn ambiguous_and_unreadable_times_are_refused_with_a_reason() {
         for (fields, words) in [
             (&["01/02/2026 23:59:59", "02/02/2026 00:00:01"][..], "the day first or the month"),
-            (&["26/01/31 23:59:59", "26/02/01 00:00:01"], "two digits of the year"),
+            (
+                &["26/01/31 23:59:59", "26/02/01 00:00:01"],
+                "a year of two digits does not show the order",
+            ),
             (&["31/01/2026 1:00:00", "01/31/2026 1:00:01"], "in another order"),
             (&["31/31/2026 1:00:00"], "neither 31 nor 31 is one"),
             (&["30.02.2026 1:00:00"], "there is no day 30 of month 2"),
