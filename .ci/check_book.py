@@ -56,6 +56,9 @@ ANSWERS = {
     "transfer function": "glossary.html#term-transfer-function",
     "phase margin": "spacecraft.html",
     "licence": "documentation/index.html#licence",
+    "s and kappa": "glossary.html#term-s-and-kappa",
+    "damping law": "which_damping.html",
+    "maximum slosh angle": "glossary.html#term-maximum-slosh-angle",
 }
 """Words that readers search for, and the end of an address that the first hits must contain."""
 HITS = 3

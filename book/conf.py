@@ -93,8 +93,8 @@ def add_terms(app: Sphinx, docname: str, source: list[str]) -> None:
 
 
 def leave_out_of_search(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Keep the history out of the search, which has every word of the book."""
-    if docname == "CHANGELOG":
+    """Keep the history and the page for developers out of the search of the book."""
+    if docname in ("CHANGELOG", "ARCHITECTURE"):
         source[0] = f"---\nnosearch: true\n---\n\n{source[0]}"
 
 
