@@ -31,8 +31,7 @@ use crate::input::record::Record;
 use crate::input::tolerance::{self, Share};
 use crate::model::simulate::Model;
 use crate::news::News;
-use crate::words::identified::{Identified, Report, residuals};
-use crate::words::page::Sections;
+use crate::words::identified::{Identified, Report, Sections, residuals};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::FmuSystem;
 

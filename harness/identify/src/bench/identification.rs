@@ -7,8 +7,7 @@ use crate::bench::causes::{Cause, Missing};
 use crate::bench::nominal::Start;
 use crate::bench::start::Response;
 use crate::estimate::Combination;
-use crate::words::identified::{Identified, Report};
-use crate::words::page::Sections;
+use crate::words::identified::{Identified, Report, Sections};
 use analysis::innovations::Tests;
 
 #[derive(Clone, Debug, Default, Serialize)]

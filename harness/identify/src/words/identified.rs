@@ -2,11 +2,11 @@ use std::collections::BTreeMap;
 
 use analysis::gauss_markov::Noise;
 use anyhow::Result;
+use maud::Markup;
 use serde::Serialize;
 
 use crate::engine::{Signal, Solution};
-use crate::estimate::Estimated;
-use crate::words::page::{self, Sections};
+use crate::estimate::{Combination, Estimated};
 
 /// Result of every method of identification; `D` contains the results that only one method has.
 #[derive(Clone, Debug, Serialize)]
@@ -65,6 +65,16 @@ pub(crate) fn residuals(
     fit.problem.signals.iter().zip(&all).zip(&fit.noise).map(one).collect()
 }
 
+/// Sections of the HTML page that only one method has.
+#[derive(Default)]
+pub struct Sections {
+    pub first: Markup,
+    pub combinations: Vec<Combination>,
+    pub figures: Markup,
+    pub condition: Option<f64>,
+    pub last: Markup,
+}
+
 /// The part of a report that differs from method to method.
 pub trait Report: Serialize + Sized {
     /// Returns the lines that a terminal shows below the table of estimates.
@@ -78,10 +88,6 @@ pub trait Report: Serialize + Sized {
 impl<D: Report> Identified<D> {
     pub fn lines(&self) -> Vec<String> {
         D::lines(self)
-    }
-
-    pub fn page(&self) -> String {
-        page::of(self, &D::sections(self))
     }
 
     pub(crate) fn new(details: D) -> Self {

@@ -8,49 +8,42 @@ use maud::{Markup, html};
 use report::page::{axis_chart, document, render_chart, series, table};
 use report::svg::{Chart, Style};
 
-use crate::estimate::Combination;
-use crate::estimate::{Estimated, prose};
+use crate::estimate::{Combination, Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::response;
 use crate::tuning::PAGE_POINTS;
-use crate::words::identified::{Identified, Residual};
+use crate::words::identified::{Identified, Report, Residual};
 use crate::words::verdict::DOUBTS;
 
 pub const RATE: &str = "rad/s";
 
-#[derive(Default)]
-pub struct Sections {
-    pub first: Markup,
-    pub combinations: Vec<Combination>,
-    pub figures: Markup,
-    pub condition: Option<f64>,
-    pub last: Markup,
-}
-
-pub fn of<D>(found: &Identified<D>, sections: &Sections) -> String {
-    let is_doubt = |line: &str| DOUBTS.iter().any(|words| line.starts_with(words));
-    let body = html! {
-        (sections.first)
-        @for line in &found.verdict { p class=[is_doubt(line).then_some("doubt")] { (line) } }
-        @if !(found.parameters.is_empty() && found.measurement.is_empty()) {
-            (parameters(found, &sections.combinations))
-        }
-        (sections.figures)
-        @for signals in &found.residuals {
-            h2 { (signals.name) }
-            @for chart in charts(signals) { (render_chart(&chart)) }
-        }
-        @if !found.correlations.0.is_empty() { (correlations(found, sections.condition)) }
-        (sections.last)
-        @if !found.done.is_empty() {
-            h2 { "What was done" }
-            details {
-                summary { (found.done.len()) " steps" }
-                ol { @for line in &found.done { li { (line) } } }
+impl<D: Report> Identified<D> {
+    pub fn page(&self) -> String {
+        let sections = D::sections(self);
+        let is_doubt = |line: &str| DOUBTS.iter().any(|words| line.starts_with(words));
+        let body = html! {
+            (sections.first)
+            @for line in &self.verdict { p class=[is_doubt(line).then_some("doubt")] { (line) } }
+            @if !(self.parameters.is_empty() && self.measurement.is_empty()) {
+                (parameters(self, &sections.combinations))
             }
-        }
-    };
-    document("Identification", &body)
+            (sections.figures)
+            @for signals in &self.residuals {
+                h2 { (signals.name) }
+                @for chart in charts(signals) { (render_chart(&chart)) }
+            }
+            @if !self.correlations.0.is_empty() { (correlations(self, sections.condition)) }
+            (sections.last)
+            @if !self.done.is_empty() {
+                h2 { "What was done" }
+                details {
+                    summary { (self.done.len()) " steps" }
+                    ol { @for line in &self.done { li { (line) } } }
+                }
+            }
+        };
+        document("Identification", &body)
+    }
 }
 
 fn charts(signals: &Residual) -> Vec<Chart> {
