@@ -8,11 +8,9 @@ use anstream::AutoStream;
 use anyhow::Result;
 use clap::ColorChoice;
 use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use files::input;
 use host::guard;
-
-use crate::commands::values_with_help;
 
 pub const GLOBAL: &str = "Global options";
 
@@ -217,4 +215,11 @@ pub fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Resu
         }
         error
     })
+}
+
+/// Returns the values of an option for its parser. `all` are pairs of a value and its meaning, which the help lists.
+pub fn values_with_help<const N: usize>(
+    all: [(&'static str, &'static str); N],
+) -> [PossibleValue; N] {
+    all.map(|(value, meaning)| PossibleValue::new(value).help(meaning))
 }

@@ -19,7 +19,7 @@ use signals::recording::Columns;
 
 use super::any_fmu::{AnyFmuArgs, PointsArgs, Request};
 use super::estimates::Out;
-use super::{DEFAULT_FMU, open, setting, values_with_help};
+use super::{DEFAULT_FMU, open, setting};
 use crate::terminal;
 
 /// Estimates parameters of an FMU from recordings, with their uncertainties.
@@ -134,7 +134,7 @@ struct KnownArgs {
     #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = parse_start)]
     starts: Vec<(String, f64, Option<f64>)>,
     /// Intersample behaviour of the torque [default: the behaviour that fits best].
-    #[arg(long, value_name = "HOW", value_parser = values_with_help([
+    #[arg(long, value_name = "HOW", value_parser = terminal::values_with_help([
         ("linear", "Straight lines between the samples (first-order hold)"),
         ("held", "Each sample is held until the next (zero-order hold), as by a sampled controller"),
         ("smooth", "Band-limited, as in a sampled recording of a smooth torque"),
@@ -163,7 +163,7 @@ pub struct BenchArgs {
         value_name = "NAME,…",
         value_delimiter = ',',
         default_value = "frozen,linear,planar,spherical",
-        value_parser = values_with_help([
+        value_parser = terminal::values_with_help([
             ("frozen", "The whole liquid is rigid"),
             ("linear", "Linear planar pendulums"),
             ("planar", "Nonlinear planar pendulums"),
@@ -178,7 +178,7 @@ pub struct BenchArgs {
         value_name = "NAME,…",
         value_delimiter = ',',
         default_value = "stribeck",
-        value_parser = values_with_help([
+        value_parser = terminal::values_with_help([
             ("none", "Bearing without friction"),
             ("viscous", "Friction proportional to the rate"),
             ("stribeck_smooth", "Stribeck curve with a smoothed sign: the hub creeps and never sticks"),
@@ -192,7 +192,7 @@ pub struct BenchArgs {
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
-        value_parser = values_with_help([
+        value_parser = terminal::values_with_help([
             ("actuator_lag", "Time constant of the actuator"),
             ("gyro_lag", "Time constant of a filter in the gyro"),
             ("friction_drift", "Relative change of the friction over a recording"),

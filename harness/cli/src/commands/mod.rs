@@ -2,7 +2,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use clap::builder::PossibleValue;
 use host::fmu::Fmu;
 use signals::table::{self, Table};
 
@@ -31,13 +30,6 @@ pub mod tank;
 pub mod torque;
 pub mod variables;
 pub mod view;
-
-/// Returns the values of an option for its parser. `all` are pairs of a value and its meaning, which the help lists.
-pub fn values_with_help<const N: usize>(
-    all: [(&'static str, &'static str); N],
-) -> [PossibleValue; N] {
-    all.map(|(value, meaning)| PossibleValue::new(value).help(meaning))
-}
 
 pub const DEFAULT_FMU: &str = "HubSlosh";
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
