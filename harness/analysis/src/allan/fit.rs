@@ -32,19 +32,17 @@ const BEYOND: usize = 2;
 /// A bias with a shorter correlation time cannot be distinguished from white noise.
 const SHORTEST: f64 = 10.0;
 
-/// Overlapping Allan variances of one record, or their means over several records, at averages of
-/// 1, 2, 4, … samples up to a tenth of a record.
+/// Overlapping Allan variances of one record, at averages of 1, 2, 4, … samples up to a tenth of
+/// the record.
 ///
 /// - `step`: time between samples, s.
-/// - `count`: number of samples of a record.
-/// - `records`: number of records.
+/// - `count`: number of samples of the record.
 /// - `factors`: number of samples in each average.
 /// - `variances`: Allan variance for each of the `factors`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octaves {
     step: f64,
     count: usize,
-    records: usize,
     factors: Vec<usize>,
     variances: Vec<f64>,
 }
@@ -102,16 +100,7 @@ impl Octaves {
             (0..usize::BITS).map(|k| 1 << k).take_while(|m| *m <= longest).collect();
         let points = overlapping(step, samples, factors.iter().copied());
         let variances = points.iter().map(|point| point.variance).collect();
-        Octaves { step, count: samples.len(), records: 1, factors, variances }
-    }
-
-    pub fn mean(records: &[Octaves]) -> Option<Octaves> {
-        let first = records.first()?;
-        let mean = |k: usize| {
-            records.iter().map(|record| record.variances[k]).sum::<f64>() / records.len() as f64
-        };
-        let variances = (0..first.variances.len()).map(mean).collect();
-        Some(Octaves { records: records.len(), variances, ..first.clone() })
+        Octaves { step, count: samples.len(), factors, variances }
     }
 
     /// Fits the noise terms `terms` to the octaves. The octaves before number `from`, which have
@@ -197,7 +186,7 @@ impl Problem<'_> {
     }
 
     fn covariance(&self, tables: &Covariance, state: &State) -> DMatrix<f64> {
-        tables.matrix(&state.coefficients) / self.octaves.records as f64
+        tables.matrix(&state.coefficients)
     }
 
     /// Returns first estimates of the coefficients, because the weights of
@@ -707,12 +696,12 @@ mod tests {
         let terms = [Term::White, Term::Flicker, Term::Walk];
         let tables = Covariance::new(STEP, 1 << 12, factors, &terms, 1.0);
         let expected = tables.matrix(&terms.map(|term| ALL.coefficient(term)));
-        let mean = Octaves::mean(&records).unwrap();
+        let mean = |k: usize| records.iter().map(|record| record.variances[k]).sum::<f64>() / 300.0;
         let covariance = |i: usize, j: usize| {
-            let products = records.iter().map(|record| {
-                (record.variances[i] - mean.variances[i])
-                    * (record.variances[j] - mean.variances[j])
-            });
+            let (mean_i, mean_j) = (mean(i), mean(j));
+            let products = records
+                .iter()
+                .map(|record| (record.variances[i] - mean_i) * (record.variances[j] - mean_j));
             products.sum::<f64>() / 299.0
         };
         for i in 0..factors.len() {
