@@ -186,7 +186,7 @@ impl Solution<'_> {
             let mut values = fit.values(&z);
             for (j, s) in &biases {
                 let moved: f64 = (0..n).filter(|i| i != j).map(|i| step[i] * means[(*s, i)]).sum();
-                let rows = problem.signals[*s].count() as f64;
+                let rows = problem.signals[*s].measured_row_count() as f64;
                 let own = fit.noise[*s].white / rows.sqrt() * random.normal();
                 values[*j] = middle[*j].at(place) + residual[*s].at(place) - moved + own;
                 if let Some(shift) = shift {

@@ -35,7 +35,7 @@ impl Signal {
     }
 
     pub fn noise_of(&self, time: &[f64], residual: &[f64]) -> Noise {
-        let count = self.count().max(1) as f64;
+        let count = self.measured_row_count().max(1) as f64;
         let least = self.least_noise();
         let sized = |drift: f64, time_constant: f64| {
             let unit = Noise { white: 1.0, drift, time: time_constant };

@@ -253,8 +253,7 @@ impl Signal {
         there.map(|(value, _)| *value).collect()
     }
 
-    /// Returns the number of rows in which the signal was measured.
-    pub fn count(&self) -> usize {
+    pub fn measured_row_count(&self) -> usize {
         self.sampled.iter().filter(|sampled| **sampled).count()
     }
 }

@@ -279,7 +279,7 @@ impl Fit<'_> {
 
     /// Returns the number of measured values, over all signals.
     pub fn sampled(&self) -> usize {
-        self.problem.signals.iter().map(Signal::count).sum()
+        self.problem.signals.iter().map(Signal::measured_row_count).sum()
     }
 
     pub fn stuck(&self, z: &[f64]) -> Vec<usize> {
