@@ -370,7 +370,7 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     ["work_axial", "omega_imu"].map(|name| real(&mut instance, name))
 }
 
-/// The expected outputs are those of a host that passes the FMU's own time and starts at 0. Before this was corrected,
+/// The outputs must equal the outputs for a host that passes the FMU's own time and starts at 0. Before this was corrected,
 /// rounding errors of the host's times caused errors of the work of up to 1.5e-4 J, and at 1e9 s gyro samples were one step
 /// late.
 #[test]

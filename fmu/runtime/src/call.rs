@@ -25,7 +25,7 @@ impl Interface {
     }
 }
 
-/// Who handles events, such as the start of sticking: the FMU within its steps, or the host in event mode.
+/// The side that handles events, such as the start of sticking: the FMU within its steps, or the host in event mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]

@@ -26,8 +26,8 @@ pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 /// could overflow.
 pub const MAX_STATE: f64 = 1e30;
 
-/// An instance of an FMU for one version of FMI. A clone of it is a complete saved state, because an instance has no other
-/// data.
+/// An instance of an FMU for one version of FMI. A clone of an instance is a complete saved state,
+/// because the instance has no data elsewhere.
 #[derive(Debug)]
 #[allow(missing_docs)]
 pub struct Instance<M: Model, V: Version> {

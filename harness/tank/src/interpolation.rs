@@ -27,7 +27,7 @@ impl Monotone {
     /// tables in this way.
     ///
     /// # Panics
-    /// As for [`Monotone::new`].
+    /// If there is no point, or `x` is not ascending.
     pub fn bounded(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::interpolate(x, y, true)
     }

@@ -212,8 +212,8 @@ mod tests {
         }
     }
 
-    /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it
-    /// connects them.
+    /// An ellipse that is too small to connect two points is enlarged until it connects them, as the
+    /// SVG standard demands.
     #[test]
     fn an_svg_arc_that_is_too_small_is_enlarged() {
         let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);

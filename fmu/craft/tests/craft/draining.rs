@@ -103,8 +103,8 @@ fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     }
 }
 
-/// By Newton's and Euler's laws the momentum of the craft is m V + w x S + S' + f r_out, with the
-/// first moment S about O, the outflow f and the position r_out of the outlet. S' is computed from
+/// The momentum of the craft is m V + w x S + S' + f r_out (Newton, Euler), with the first moment S
+/// about O, the outflow f and the position r_out of the outlet. S' is computed from
 /// differences of the centre of mass in the outputs.
 #[test]
 fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {

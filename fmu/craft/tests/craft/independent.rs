@@ -775,8 +775,8 @@ fn a_single_tank_follows_newtons_law() {
     }
 }
 
-/// The force and torque of a tank in a craft equal those of a SloshTank that is moved like the
-/// craft. The drag does not depend on the acceleration here. Otherwise it would differ, because the
+/// The force and torque of a tank in a craft equal the force and torque of a SloshTank that is moved
+/// like the craft. The drag does not depend on the acceleration here. Otherwise it would differ, because the
 /// craft computes the acceleration from the motion of craft and liquids as one rigid body, and the
 /// SloshTank takes it from its inputs.
 #[test]

@@ -128,7 +128,7 @@ fn friction_in_full_spheroids_changes_nutation_as_the_closed_form_says() {
     }
 }
 
-/// By Rumyantsev's criterion a spinning craft is stable if the rates of both nutations are real. In
+/// Rumyantsev's criterion says that a spinning craft is stable if the rates of both nutations are real. In
 /// an unstable craft a nutation of 1e-7 rad/s at least doubles in the time in which the closed form
 /// predicts a growth by a factor of 1,000. In a stable craft its amplitude stays within the beat of
 /// the two nutations.
