@@ -38,9 +38,10 @@ const CHAPTERS: [(Causality, &str, &str); 5] = [
 ];
 
 pub fn page<M: Model>() -> String {
-    let mut page = String::from(
+    let model = M::table().about.model;
+    let mut page = format!(
         "<!-- Written by `cargo run --release -p model-description`; do not edit. -->\n\
-         # All variables\n\n\
+         # All variables of {model}\n\n\
          Which variables does the FMU have, in which units and ranges?\n\n\
          Host and FMU exchange values in the first unit of the column \"unit\"; the unit in brackets is for display. The \
          FMU refuses values outside the ranges.",
