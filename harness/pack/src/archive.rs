@@ -16,12 +16,6 @@ use crate::fmi::Fmi;
 /// because some hosts expect it there.
 pub type Files = Vec<(String, Vec<u8>)>;
 
-const QUICK: i64 = 9;
-/// Compression level for archives that are distributed. At levels above 9 the crate `zip` uses
-/// Zopfli, with one iteration for each further level. Five iterations would make a binary smaller
-/// by 0.2 % and take a third longer.
-const SMALL: i64 = 10;
-
 pub struct Packed {
     pub folder: &'static str,
     pub ending: &'static str,
@@ -80,27 +74,16 @@ pub fn plain(
 
 pub fn zipped(files: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     let mut out = std::io::Cursor::new(Vec::new());
-    zip(&mut out, files, QUICK)?;
+    zip(&mut out, files)?;
     Ok(out.into_inner())
 }
 
-/// Packs files into the archive `out`, which is either written completely or not at all. It
-/// compresses quickly, for archives that are not distributed.
+/// Packs files into the archive `out`, which is either written completely or not at all.
 pub fn write(files: &Files, out: &Path) -> Result<()> {
-    write_at(files, out, QUICK)
-}
-
-/// Packs files into the archive `out` for distribution. It compresses with Zopfli, which makes
-/// binaries smaller by 3.6 % than [`write`] does, and takes 1.5 s of CPU time per megabyte.
-pub fn write_small(files: &Files, out: &Path) -> Result<()> {
-    write_at(files, out, SMALL)
-}
-
-fn write_at(files: &Files, out: &Path, level: i64) -> Result<()> {
     if let Some(parent) = out.parent().filter(|parent| !parent.as_os_str().is_empty()) {
         output::directory(parent)?;
     }
-    output::atomically(out, |file| zip(file, files, level))
+    output::atomically(out, |file| zip(file, files))
         .with_context(|| format!("{} was not packed", out.display()))
 }
 
@@ -128,9 +111,9 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
 }
 
-/// Writes a zip archive of `files` to `out` with the compression level `level`. The order of the
-/// files, their times and their attributes are fixed, so that equal files give equal archives.
-fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)], level: i64) -> Result<()> {
+/// Writes a zip archive of `files` to `out`. The order of the files, their times and their
+/// attributes are fixed, so that equal files give equal archives.
+fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)]) -> Result<()> {
     let mut archive = ZipWriter::new(out);
     for (name, bytes) in files {
         // The binaries of an FMU and the command in a wheel are executable.
@@ -138,8 +121,7 @@ fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)], level: i64) -
         let mode = if program { 0o755 } else { 0o644 };
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(level))
-            .with_zopfli_buffer(None) // a file in one piece: the smallest
+            .compression_level(Some(9)) // the highest of deflate
             .last_modified_time(DateTime::default()) // 1980-01-01, the oldest a zip can say
             .unix_permissions(mode);
         archive.start_file(name.as_str(), options)?;
@@ -161,7 +143,7 @@ mod tests {
             [("b.txt".to_string(), b"two".to_vec()), ("binaries/a".to_string(), vec![0; 9999])];
         let packed = || {
             let mut out = Cursor::new(Vec::new());
-            zip(&mut out, &files, SMALL).unwrap();
+            zip(&mut out, &files).unwrap();
             out.into_inner()
         };
         assert_eq!(packed(), packed());

@@ -25,7 +25,7 @@ use host::description::ModelDescription;
 use crate::archive::{Files, Packed, below, read};
 pub use crate::fmi::Fmi;
 pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, model, named};
-pub use crate::platforms::Built;
+pub use crate::platforms::{Built, Platform};
 pub use crate::project::{build, build_native, has_source, needs_source, root};
 
 /// Builds the binary of an FMU for the platform on which this program runs, and packs the FMU in
@@ -35,8 +35,15 @@ pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     archive::write(&files(model, fmi, &[binary])?, out)
 }
 
-pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
-    let all = platforms::build(model)?;
+/// Builds the binaries of an FMU for `platforms`, and packs the FMU with them in the form `fmi` to
+/// `out`. Returns the binaries.
+pub fn pack_for(
+    platforms: &[&Platform],
+    model: &Model,
+    fmi: Fmi,
+    out: &Path,
+) -> Result<Vec<Built>> {
+    let all = platforms::build(platforms, model)?;
     pack_built(model, fmi, &all, out)?;
     Ok(all)
 }
@@ -46,7 +53,7 @@ fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> 
         .iter()
         .map(|b| Packed { folder: b.folder, ending: b.ending, bytes: b.bytes.clone() })
         .collect();
-    archive::write_small(&files(model, fmi, &binaries)?, out)
+    archive::write(&files(model, fmi, &binaries)?, out)
 }
 
 pub fn packed_for_tests() -> &'static Path {

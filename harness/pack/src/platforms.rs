@@ -14,6 +14,7 @@ use anyhow::{Context, Result, bail};
 use host::binary::{self, Binary};
 use host::fmi2::Fmu;
 
+use crate::archive;
 use crate::models::Model;
 use crate::project;
 
@@ -127,22 +128,22 @@ pub struct Built {
     pub binary: Binary,
 }
 
-/// Builds and checks the binaries of an FMU for all platforms.
+/// Builds and checks the binaries of an FMU for `platforms`.
 ///
 /// # Errors
 ///
 /// Before building, everything that is missing; after building, all faults of all binaries.
-pub fn build(model: &Model) -> Result<Vec<Built>> {
+pub fn build(platforms: &[&Platform], model: &Model) -> Result<Vec<Built>> {
     let toolchain = Toolchain::find()?;
-    toolchain.check(&PLATFORMS.each_ref())?;
+    toolchain.check(platforms)?;
     let mut faults = Vec::new();
     let mut all = Vec::new();
-    for platform in &PLATFORMS {
+    for platform in platforms {
         eprintln!("building for {}", platform.folder);
         let parts = platform
             .targets
             .iter()
-            .map(|target| toolchain.build(&Product::Fmu(model), platform, target))
+            .map(|target| toolchain.build(model, platform, target))
             .collect::<Result<Vec<_>>>()?;
         let bytes = match <[Vec<u8>; 1]>::try_from(parts) {
             Ok([only]) => only,
@@ -162,12 +163,6 @@ pub fn refuse(faults: &[String]) -> Result<()> {
         bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());
     }
     Ok(())
-}
-
-pub enum Product<'a> {
-    Fmu(&'a Model),
-    Native,
-    Command,
 }
 
 pub struct Toolchain {
@@ -218,15 +213,45 @@ impl Toolchain {
         })
     }
 
-    pub fn build(
-        &self,
-        product: &Product,
-        platform: &Platform,
-        target: &Target,
-    ) -> Result<Vec<u8>> {
-        let path = project::cargo_build(self.command(product, platform, target)?, false)
+    /// Builds the binary of an FMU for `target`, and returns its bytes.
+    pub fn build(&self, model: &Model, platform: &Platform, target: &Target) -> Result<Vec<u8>> {
+        let mut command = self.command("rustc", &[], platform, target);
+        project::arguments(&mut command, model.package);
+        let mut link: Vec<_> = platform.link.iter().map(|&argument| argument.to_string()).collect();
+        if platform.folder == "darwin64" {
+            // Hosts load the library by its path. Its install name must not contain a folder of this machine.
+            link.push(format!("-Wl,-install_name,@rpath/{}{}", model.name, platform.ending));
+        }
+        command.args(link.iter().map(|argument| format!("-Clink-arg={argument}")));
+        let path = project::cargo_build(command, false)
+            .and_then(project::last)
             .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
-        std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
+        archive::read(&path)
+    }
+
+    /// Builds the library of the Python package and the command `hubslosh` for `target`, and returns
+    /// the bytes of both in this order.
+    pub fn build_harness(&self, platform: &Platform, target: &Target) -> Result<[Vec<u8>; 2]> {
+        let mut link: Vec<_> = platform.link.iter().map(|&argument| argument.to_string()).collect();
+        if platform.folder == "darwin64" {
+            // Zig includes only the C library of macOS; this folder has the names of the other libraries.
+            link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
+        }
+        let flags: Vec<_> = link.iter().map(|argument| format!("-Clink-arg={argument}")).collect();
+        let mut command = self.command("build", &flags, platform, target);
+        project::harness_arguments(&mut command)?;
+        // With link-time optimisation, as for an FMU, the command is a quarter smaller.
+        command.env("CARGO_PROFILE_RELEASE_LTO", "fat");
+        command.env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1");
+        command.env("CARGO_PROFILE_RELEASE_STRIP", "symbols");
+        let place = || format!("{} ({})", platform.folder, target.triple);
+        let built = project::cargo_build(command, false).with_context(place)?;
+        let read = |wanted: &str| {
+            let found = built.iter().find(|(name, _)| name.replace('-', "_") == wanted);
+            let (_, path) = found.with_context(|| format!("cargo built no {wanted}"))?;
+            archive::read(path)
+        };
+        Ok([read("hubslosh_native").with_context(place)?, read("hubslosh").with_context(place)?])
     }
 
     /// Lists the faults of a binary as parts of sentences: the faults `found` by the caller, and
@@ -293,20 +318,26 @@ impl Toolchain {
         )
     }
 
-    fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Result<Command> {
+    /// Returns a call of Cargo's subcommand `what` for `target`. The compiler gets `flags` for every crate.
+    fn command(
+        &self,
+        what: &str,
+        flags: &[String],
+        platform: &Platform,
+        target: &Target,
+    ) -> Command {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),
             Cargo::Zig => Command::new("cargo-zigbuild"),
         };
         command.env("PATH", &self.path);
-        command.args(["rustc", "--locked", "--target"]);
+        command.args([what, "--locked", "--target"]);
         command.arg(format!("{}{}", target.triple, target.suffix));
         // Paths of this machine are replaced, so that equal sources give equal bytes on every machine.
         let registry = Path::new(&self.home).join("registry").join("src");
-        let mut flags = vec![
-            format!("--remap-path-prefix={}=.", self.root.display()),
-            format!("--remap-path-prefix={}=crates", registry.display()),
-        ];
+        let mut flags = flags.to_vec();
+        flags.push(format!("--remap-path-prefix={}=.", self.root.display()));
+        flags.push(format!("--remap-path-prefix={}=crates", registry.display()));
         if !self.has_standard_library(target.triple)
             && let Some(source) = &self.source
         {
@@ -315,41 +346,11 @@ impl Toolchain {
             command.arg("-Zbuild-std=std,panic_unwind");
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
         }
-        if matches!(product, Product::Native | Product::Command) {
-            // With link-time optimisation, as for an FMU, the command is a quarter smaller.
-            command.env("CARGO_PROFILE_RELEASE_LTO", "fat");
-            command.env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1");
-        }
         command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
         command.env("MACOSX_DEPLOYMENT_TARGET", binary::MACOS.to_string());
         command.env("SOURCE_DATE_EPOCH", "0");
-        let linker = MINGW.program;
-        command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", linker);
-        let name = match product {
-            Product::Fmu(model) => {
-                project::arguments(&mut command, model.package);
-                Some(model.name.to_string())
-            }
-            Product::Native => {
-                project::native_arguments(&mut command)?;
-                Some("hubslosh_native".into())
-            }
-            Product::Command => {
-                project::program_arguments(&mut command)?;
-                None
-            }
-        };
-        let mut link: Vec<_> = platform.link.iter().map(|&argument| argument.to_string()).collect();
-        if let (Some(name), "darwin64") = (&name, platform.folder) {
-            // Hosts load the library by its path. Its install name must not contain a folder of this machine.
-            link.push(format!("-Wl,-install_name,@rpath/{name}{}", platform.ending));
-        }
-        if let (Product::Native | Product::Command, "darwin64") = (product, platform.folder) {
-            // Zig includes only the C library of macOS; this folder has the names of the other libraries.
-            link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
-        }
-        command.args(link.iter().map(|argument| format!("-Clink-arg={argument}")));
-        Ok(command)
+        command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", MINGW.program);
+        command
     }
 }
 

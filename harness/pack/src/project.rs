@@ -50,7 +50,7 @@ pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     let mut command = cargo();
     command.arg("rustc");
     arguments(&mut command, package);
-    cargo_build(command, quiet)
+    last(cargo_build(command, quiet)?)
 }
 
 /// Returns a command that runs Cargo. If this program was started by Cargo, the command is the same
@@ -88,23 +88,16 @@ fn optimise_for_size(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Adds the arguments of `cargo rustc` for the distributed command `hubslosh`. Arguments that
-/// follow go to the compiler.
-pub(crate) fn program_arguments(command: &mut Command) -> Result<()> {
-    command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
-    optimise_for_size(command)?;
-    command.args(["--features", "shipped", "--message-format", "json-render-diagnostics"]);
-    command.args(["--", "-Cstrip=symbols"]);
-    Ok(())
-}
-
 pub(crate) const NATIVE: &str = "hubslosh-native";
 
-pub(crate) fn native_arguments(command: &mut Command) -> Result<()> {
-    command.args(["--release", "--package", NATIVE, "--lib", "--crate-type", "cdylib"]);
-    optimise_for_size(command)?;
-    command.args(["--message-format", "json-render-diagnostics", "--"]);
-    Ok(())
+/// Adds the arguments of `cargo build` for the distributed command `hubslosh` and the library of the
+/// Python package. One call builds both, because two calls would compile the crates that both need
+/// twice, with different features.
+pub(crate) fn harness_arguments(command: &mut Command) -> Result<()> {
+    command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
+    command.args(["--package", NATIVE, "--lib", "--features", "hubslosh/shipped"]);
+    command.args(["--message-format", "json-render-diagnostics"]);
+    optimise_for_size(command)
 }
 
 /// Builds the library of the Python package for the platform on which this program runs. Returns
@@ -120,10 +113,18 @@ pub fn build_native(quiet: bool) -> Result<PathBuf> {
     let mut command = cargo();
     command.args(["build", "--locked", "--release", "--lib", "--package", "hubslosh"]);
     command.args(["--package", NATIVE, "--message-format", "json-render-diagnostics"]);
-    cargo_build(command, quiet)
+    last(cargo_build(command, quiet)?)
 }
 
-pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> {
+/// Returns the path of the binary that Cargo built last: dependencies are built first.
+pub(crate) fn last(mut built: Vec<(String, PathBuf)>) -> Result<PathBuf> {
+    let (_, path) = built.pop().context("cargo built a binary but does not say where it is")?;
+    Ok(path)
+}
+
+/// Runs a command that calls Cargo. Returns the name of the target and the path of each program and
+/// shared library that it built.
+pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<Vec<(String, PathBuf)>> {
     let root = root();
     needs_source("an FMU's binary")?;
     command.current_dir(&root);
@@ -137,18 +138,16 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
     if !built.status.success() {
         bail!("cargo could not build the package");
     }
-    Message::parse_stream(&built.stdout[..])
-        .filter_map(|message| match message {
-            Ok(Message::CompilerArtifact(artifact)) => Some(artifact),
-            _ => None,
-        })
-        .filter_map(|artifact| {
-            let library = artifact.target.kind.contains(&TargetKind::CDyLib);
-            let mut files = artifact.filenames.into_iter();
-            let of = |name: &Utf8PathBuf| matches!(name.extension(), Some("so" | "dll" | "dylib"));
-            artifact.executable.or_else(|| files.find(of).filter(|_| library))
-        })
-        .last()
-        .map(PathBuf::from)
-        .context("cargo built a binary but does not say where it is")
+    let artifacts = Message::parse_stream(&built.stdout[..]).filter_map(|message| match message {
+        Ok(Message::CompilerArtifact(artifact)) => Some(artifact),
+        _ => None,
+    });
+    let binaries = artifacts.filter_map(|artifact| {
+        let library = artifact.target.kind.contains(&TargetKind::CDyLib);
+        let mut files = artifact.filenames.into_iter();
+        let of = |name: &Utf8PathBuf| matches!(name.extension(), Some("so" | "dll" | "dylib"));
+        let path = artifact.executable.or_else(|| files.find(of).filter(|_| library))?;
+        Some((artifact.target.name, PathBuf::from(path)))
+    });
+    Ok(binaries.collect())
 }

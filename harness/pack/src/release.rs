@@ -50,7 +50,7 @@ pub fn write(
     folder: &Path,
     check: impl Fn(&Path) -> Result<String>,
 ) -> Result<Vec<PathBuf>> {
-    let all = platforms::build(model)?;
+    let all = platforms::build(&PLATFORMS.each_ref(), model)?;
     for built in &all {
         eprintln!("{}: {}", built.folder, built.binary);
     }

@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 
 use crate::archive::{self, Files, Packed, below, read};
 use crate::metadata::{self, PACKAGE, VERSION};
-use crate::platforms::{self, Platform, Product, Target, Toolchain};
+use crate::platforms::{self, Platform, Target, Toolchain};
 use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu, pack, root};
 
 const ABI: &str = "cp311-abi3";
@@ -39,7 +39,7 @@ struct Binaries {
 /// If a file cannot be built, read or written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     check_folder(folder)?;
-    write_one(folder, native()?, archive::write)
+    write_one(folder, native()?)
 }
 
 /// Builds wheels for other platforms, one for each processor, and returns their paths in `folder`.
@@ -50,8 +50,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 /// platform. In this case no wheel is written.
 pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
     check_folder(folder)?;
-    let write = |binaries| write_one(folder, binaries, archive::write_small);
-    cross_build(platforms)?.into_iter().map(write).collect()
+    cross_build(platforms)?.into_iter().map(|binaries| write_one(folder, binaries)).collect()
 }
 
 fn check_folder(folder: &Path) -> Result<()> {
@@ -79,7 +78,7 @@ pub fn for_tests(fmus: &[&Path]) -> PathBuf {
         let native = (native_name(std::env::consts::DLL_SUFFIX), library);
         let binaries = Binaries { folder: PLATFORM, fmus: fmus_in, native, command: None, read };
         let folder = fmus[0].parent().context("the path of the FMU has no folder")?;
-        write_one(folder, binaries, archive::write)
+        write_one(folder, binaries)
     };
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
 }
@@ -133,31 +132,29 @@ fn cross_build_binaries(
 ) -> Result<Binaries> {
     let made = tempfile::tempdir().context("no temporary folder can be made")?;
     let mut read = Vec::new();
-    let mut built = |product: &Product| -> Result<Vec<u8>> {
-        let bytes = toolchain.build(product, platform, target)?;
-        let mut binary = Binary::read(&bytes).context(target.triple)?;
-        if matches!(product, Product::Native) {
-            // The wheel may need python3.dll, although it is not part of every system, because Python
-            // itself has loaded it.
-            binary.libraries.retain(|library| library != "python3.dll");
-        }
+    // The wheel may need `provided`, although it is not part of every system.
+    let mut check = |bytes: &[u8], provided: Option<&str>| -> Result<()> {
+        let mut binary = Binary::read(bytes).context(target.triple)?;
+        binary.libraries.retain(|library| Some(library.as_str()) != provided);
         let found = binary.loading_faults_for(&[target.architecture]);
-        faults.extend(toolchain.faults(platform, &bytes, found));
+        faults.extend(toolchain.faults(platform, bytes, found));
         read.push(binary);
-        Ok(bytes)
+        Ok(())
     };
     let mut fmus = Files::new();
     for model in MODELS {
-        let bytes = built(&Product::Fmu(&model))?;
+        let bytes = toolchain.build(&model, platform, target)?;
+        check(&bytes, None)?;
         let binary = [Packed { folder: platform.folder, ending: platform.ending, bytes }];
         for fmi in Fmi::ALL {
             let fmu = fmi.path(made.path(), model.name);
-            archive::write_small(&files_of_fmu(&model, fmi, &binary)?, &fmu)?;
+            archive::write(&files_of_fmu(&model, fmi, &binary)?, &fmu)?;
             fmus.push((file_name(&fmu), archive::read(&fmu)?));
         }
     }
-    let library = built(&Product::Native)?;
-    let command = built(&Product::Command)?;
+    let [library, command] = toolchain.build_harness(platform, target)?;
+    check(&library, Some("python3.dll"))?; // Python itself has loaded it
+    check(&command, None)?;
     let ending = if platform.ending == ".dll" { ".exe" } else { "" };
     Ok(Binaries {
         folder: platform.folder,
@@ -172,14 +169,10 @@ fn native_name(ending: &str) -> &'static str {
     if ending == ".dll" { "_native.pyd" } else { "_native.abi3.so" }
 }
 
-fn write_one(
-    folder: &Path,
-    binaries: Binaries,
-    write: fn(&Files, &Path) -> Result<()>,
-) -> Result<PathBuf> {
+fn write_one(folder: &Path, binaries: Binaries) -> Result<PathBuf> {
     let tags = tags(&binaries.read)?;
     let out = folder.join(format!("{PACKAGE}-{VERSION}-{ABI}-{}.whl", tags.join(".")));
-    write(&files(binaries, &tags)?, &out)?;
+    archive::write(&files(binaries, &tags)?, &out)?;
     Ok(out)
 }
 

@@ -31,9 +31,9 @@ pub struct PackArgs {
     /// Packs the Python package as a wheel instead of an FMU, with all FMUs and the command hubslosh inside.
     #[arg(long, conflicts_with = "model")]
     python: bool,
-    /// Packs wheels only for these platforms, which are named as the folders of binaries in an FMU, such as win64 or
+    /// Builds only for these platforms, which are named as the folders of binaries in an FMU, such as win64 or
     /// aarch64-linux. Like --all-platforms it needs the tools for building for other platforms.
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "python", conflicts_with = "all_platforms", value_parser = platforms::platform)]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', conflicts_with_all = ["all_platforms", "sdist"], value_parser = platforms::platform)]
     platform: Vec<&'static Platform>,
     /// Packs the source of the Python package as an sdist, from which pip builds the package, instead of an FMU.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
@@ -67,13 +67,16 @@ pub struct PackArgs {
 impl PackArgs {
     pub fn run(self) -> Result<()> {
         pack::needs_source("an FMU")?;
+        let platforms = match self.all_platforms {
+            true => PLATFORMS.iter().collect(),
+            false => self.platform.clone(),
+        };
         if self.python || self.sdist {
             let folder = self.out.unwrap_or_else(|| "dist".into());
             let packed = match self.sdist {
                 true => vec![sdist::write(&folder)?],
-                false if self.all_platforms => wheel::write_for(&PLATFORMS.each_ref(), &folder)?,
-                false if !self.platform.is_empty() => wheel::write_for(&self.platform, &folder)?,
-                false => vec![wheel::write(&folder)?],
+                false if platforms.is_empty() => vec![wheel::write(&folder)?],
+                false => wheel::write_for(&platforms, &folder)?,
             };
             for file in packed {
                 done!("packed {} ({} bytes)", file.display(), file.metadata()?.len());
@@ -95,13 +98,13 @@ impl PackArgs {
                 _ => format!("{name}_{}", limit.size),
             });
         let out = self.out.clone().unwrap_or_else(|| fmi.path("dist".as_ref(), &name));
-        if !self.all_platforms {
+        if platforms.is_empty() {
             pack::pack(model, fmi, &out)?;
             self.reduce(&limits, &out)?;
             done!("packed {}", out.display());
             return Ok(());
         }
-        for built in pack::pack_all(model, fmi, &out)? {
+        for built in pack::pack_for(&platforms, model, fmi, &out)? {
             done!("{}: {}", built.folder, built.binary);
         }
         self.reduce(&limits, &out)?;
