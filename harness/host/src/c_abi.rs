@@ -416,19 +416,3 @@ pub(crate) fn missing_functions(library: &Library, symbols: &[&'static str]) -> 
     };
     symbols.iter().filter(|symbol| !is_there(symbol)).copied().collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_binary_that_lacks_pythons_symbols_needs_a_python_host() {
-        for symbol in ["_Py_NoneStruct", "PyExc_TypeError", "__Py_Dealloc"] {
-            let error = format!("binaries/linux64/model.so: undefined symbol: {symbol}");
-            assert!(explain_needs(&error).contains("needs a Python host"), "{symbol}");
-        }
-        for error in ["model.so: undefined symbol: cos", "model.so: file too short", "PyExc"] {
-            assert_eq!(explain_needs(error), "", "{error}");
-        }
-    }
-}

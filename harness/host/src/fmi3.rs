@@ -923,16 +923,3 @@ fn require_whole_step(instance: &Instance, done: Step) -> Called {
     messages.push(Message { status, category: String::new(), text });
     Err(CallError { call: "fmi3DoStep", status, messages })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_fmu_3_must_export_75_functions() {
-        let mut all = Fmu::symbols();
-        all.sort_unstable();
-        all.dedup();
-        assert_eq!(all.len(), 75);
-    }
-}

@@ -158,6 +158,27 @@ fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
     assert!(untold.is_empty(), "{}", untold.join("\n"));
 }
 
+/// The library writes four bytes behind or eight bytes before an array of fmi2GetRealOutputDerivatives, or into the array of
+/// orders, which an FMU may only read.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_finding_about_an_array_says_where_the_fmu_has_written() {
+    for (word, array, fault) in [
+        ("writes_past_orders", "order, ", "it writes up to 4 bytes past its end"),
+        ("writes_before", "value, ", "it writes up to 8 bytes before its beginning"),
+        ("writes_orders", "order, ", "it changes an array that it may only read"),
+    ] {
+        let report = check_bytes(&misbehaving(word), &["host.arrays"]);
+        let place = format!("fmi2GetRealOutputDerivatives, {array}");
+        let all: Vec<_> = report.all().collect();
+        assert!(!all.is_empty(), "{word}");
+        for (_, finding) in all {
+            let is_there = finding.place.starts_with(&place) && finding.text.starts_with(fault);
+            assert!(is_there, "{word}: {}", report.text());
+        }
+    }
+}
+
 #[cfg(target_os = "linux")]
 fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
     let report = check_bytes(&misbehaving(word), &[rule]);

@@ -267,6 +267,8 @@ fn undefined_symbols_of_cpp_and_python_are_reported_in_readable_form() {
     for (symbol, told) in [
         ("_ZNK9pythonfmu7PyState4callEv", "undefined symbol: pythonfmu::PyState::call"),
         ("_Py_NoneStruct", "needs a Python host"),
+        ("PyExc_TypeError", "needs a Python host"),
+        ("__Py_Dealloc", "needs a Python host"),
     ] {
         let undefined = format!("-DUNDEFINED={symbol}");
         let definitions = [BOTH, &[&undefined]].concat();
@@ -275,6 +277,8 @@ fn undefined_symbols_of_cpp_and_python_are_reported_in_readable_form() {
         let text = report.text();
         assert!(broken_rules(&report).contains("load.opens"), "{text}");
         assert!(text.contains(told), "{text}");
+        let is_of_python = symbol.trim_start_matches('_').starts_with("Py");
+        assert_eq!(text.contains("needs a Python host"), is_of_python, "{text}");
         assert!(text.contains("1001 symbols, among them pythonfmu::m000, "), "{text}");
         let longest = report.all().map(|(_, finding)| finding.text.len()).max();
         assert!(longest < Some(500) && !text.contains("_ZN"), "{longest:?}: {text}");

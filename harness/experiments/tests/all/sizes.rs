@@ -84,6 +84,13 @@ fn spacecraft_with_arrays_and_spacecraft_with_scalars_move_bit_identically() {
     let same = parameters(scalars.description(), &settings(&SCALARS), &[]);
     assert_eq!(of("tank.hinge[2,1]"), same.get("tank[2].hinge[1]").map(String::as_str));
     assert_eq!(of("tank.diameter[3]"), None);
+    // The description has the set size, and as many elements of each array as this size requires, in row-major order.
+    let description = arrays.description();
+    let size = description.variable("tanks").unwrap().attributes().start.as_deref();
+    let last = description.variable("tank.position[2,3]").unwrap().reference;
+    let last = description.element(last).unwrap();
+    let length = description.array(last.array).unwrap().length;
+    assert_eq!((size, last.index, length), (Some("2"), 5, 6));
 }
 
 #[test]

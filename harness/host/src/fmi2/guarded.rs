@@ -267,27 +267,3 @@ fn record_faults(
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_fmu_that_writes_outside_an_array_of_the_host_is_detected() {
-        let mut array = Guarded::output::<c_int>(3);
-        // SAFETY: the address is inside the array.
-        unsafe { array.pointer::<c_int>().add(2).write(7) };
-        assert_eq!(array.fault(), None);
-        // SAFETY: the address is inside the margin.
-        unsafe { array.pointer::<u8>().add(12).write(1) };
-        assert_eq!(array.fault().as_deref(), Some("it writes up to 1 bytes past its end"));
-        let mut array = Guarded::output::<f64>(1);
-        // SAFETY: the address is inside the margin.
-        unsafe { array.pointer::<u8>().sub(8).write(1) };
-        assert_eq!(array.fault().as_deref(), Some("it writes up to 8 bytes before its beginning"));
-        let mut array = Guarded::input(&[1.0, 2.0]);
-        // SAFETY: the address is inside the array.
-        unsafe { array.pointer::<f64>().write(3.0) };
-        assert_eq!(array.fault().as_deref(), Some("it changes an array that it may only read"));
-    }
-}
