@@ -301,25 +301,3 @@ pub fn system(binaries: &Binaries, findings: &mut Findings) {
         }
     });
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn binary_folders_are_recognised_as_platforms_tuples_or_vendor_names() {
-        for (folder, ending, kind) in [
-            ("linux64", ".so", Some(Kind::Linux)),
-            ("win32", ".dll", None),
-            ("aarch64-linux-gnu", ".so", Some(Kind::LinuxArm)),
-            ("aarch64-darwin", ".dylib", Some(Kind::MacOs)),
-            ("x86_64-windows-msvc143", ".dll", Some(Kind::Windows)),
-            ("aarch32-linux-gnueabihf", ".so", None),
-        ] {
-            assert_eq!(platform(folder), Some((ending, kind)), "{folder}");
-        }
-        for vendors in ["VisualStudio8", "gcc4", "arm-linux-gnueabihf", "linux-64", "x86_64"] {
-            assert_eq!(platform(vendors), None, "{vendors}");
-        }
-    }
-}

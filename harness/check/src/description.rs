@@ -373,25 +373,3 @@ fn unknown(words: &Words, list: &str, element: &Element) -> Unknown {
         kinds: words("dependenciesKind").map(|all| all.into_iter().map(String::from).collect()),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn missing_attributes_of_a_variable_get_the_defaults_of_the_standard() {
-        let xml = br#"<fmiModelDescription><TypeDefinitions><SimpleType name="T"><Real unit="m"
-            min="1"/></SimpleType></TypeDefinitions><ModelVariables>
-            <ScalarVariable name="a" valueReference="3"><Real declaredType="T" min="2"/></ScalarVariable>
-            <ScalarVariable name="b" valueReference="4" causality="parameter" variability="fixed"><Integer/></ScalarVariable>
-            <ScalarVariable name="c" valueReference="4"><Boolean/></ScalarVariable>
-            </ModelVariables></fmiModelDescription>"#;
-        let d = Description::read(xml).unwrap();
-        let [a, b, c] = &d.variables[..] else { panic!() };
-        assert_eq!((&a.causality, &a.variability), (&Causality::Local, &Variability::Continuous));
-        assert_eq!(a.initial.as_deref(), Some("calculated"));
-        assert_eq!((a.bounds(), a.typed.get("unit")), ((2.0, f64::INFINITY), Some("m")));
-        assert_eq!((b.initial.as_deref(), b.kind, b.key), (Some("exact"), Type::Integer, 2));
-        assert_eq!(c.variability, Variability::Discrete);
-    }
-}

@@ -310,30 +310,3 @@ pub fn table(rules: &[Rule]) -> String {
     }
     text.trim_start().to_string()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rule_names_are_unique_and_rules_of_a_group_are_adjacent() {
-        for rules in [RULES, fmi3::RULES] {
-            let names: BTreeSet<_> = rules.iter().map(|rule| rule.id).collect();
-            assert_eq!(names.len(), rules.len());
-            let mut groups: Vec<_> =
-                rules.iter().map(|r| r.id.split_once('.').unwrap().0).collect();
-            groups.dedup();
-            let unique: BTreeSet<_> = groups.iter().collect();
-            assert_eq!(unique.len(), groups.len(), "a group is torn apart: {groups:?}");
-        }
-    }
-
-    #[test]
-    fn selecting_a_group_selects_exactly_its_rules() {
-        let rule = |id| RULES.iter().find(|rule| rule.id == id).unwrap();
-        assert!(is_selected(rule("zip.names"), "zip"));
-        assert!(is_selected(rule("zip.names"), "zip.names"));
-        assert!(!is_selected(rule("zip.names"), "zip.name"));
-        assert!(!is_selected(rule("zip.names"), "xml"));
-    }
-}

@@ -157,35 +157,3 @@ pub fn capitals(archive: &Archive, findings: &mut Findings) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn file_names_that_windows_cannot_have_are_found() {
-        for wrong in ["CON", "nul.txt", "com1", "LPT9.a.b", "a.", "a ", "a?b", "a:b", "aux .c"] {
-            assert!(!windows_faults(wrong).is_empty(), "{wrong}");
-        }
-        for right in ["CONE", "com", "com0", "com10", "a.b", ".a", "a b", "nulled.txt", "lptx"] {
-            assert_eq!(windows_faults(right), [""; 0], "{right}");
-        }
-    }
-
-    #[test]
-    fn folder_names_of_the_standard_in_wrong_capitals_are_reported() {
-        for (wrong, right) in [
-            ("Binaries/Linux64/a.so", "binaries/linux64/a.so"),
-            ("binaries/Win64/a.dll", "binaries/win64/a.dll"),
-            ("binaries/AArch64-linux/a.so", "binaries/aarch64-linux/a.so"),
-            ("ModelDescription.xml", "modelDescription.xml"),
-            ("Resources/a", "resources/a"),
-        ] {
-            assert_eq!(standard_spelling(wrong).as_deref(), Some(right));
-        }
-        for right in ["binaries/linux64/A.so", "resources/Binaries/a", "Extras/a", "Documentation"]
-        {
-            assert_eq!(standard_spelling(right), None, "{right}");
-        }
-    }
-}

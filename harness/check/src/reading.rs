@@ -95,36 +95,3 @@ pub fn size(archive: &Archive, findings: &mut Findings) {
         findings.at(NAME).add(why);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_encoding_of_an_xml_file_is_read_from_its_declaration() {
-        let found = |text: &str| encoding(text.as_bytes());
-        assert_eq!(found("<?xml version='1.0' encoding = 'ISO-8859-1' ?>").unwrap(), "ISO-8859-1");
-        assert_eq!(found("\u{feff}<?xml encoding=\"UTF-8\"?><a/>").unwrap(), "UTF-8");
-        for none in ["", "<a encoding=\"x\"/>", "<?xml version=\"1.0\"?><a/>", "<?xml encoding=\"x"]
-        {
-            assert_eq!(found(none), None, "{none}");
-        }
-    }
-
-    #[test]
-    fn a_document_type_declaration_is_found_before_the_root_and_nowhere_else() {
-        let found = |text: &str| Doctype::find(text.as_bytes());
-        let simple = found("<?xml version=\"1.0\"?>\n<!-- a -->\n<!DOCTYPE a><a/>").unwrap();
-        assert_eq!(
-            (simple.line, simple.text.as_str(), simple.parser_reaction()),
-            (3, "<!DOCTYPE a>", "many parsers refuse it")
-        );
-        let bomb = found("<!DOCTYPE a [<!ENTITY b \"c>d\"> ]><a/>").unwrap();
-        assert!(bomb.text.ends_with("]>") && bomb.parser_reaction().contains("entities"));
-        let outside = found("<!doctype a SYSTEM \"file:///etc/passwd\"><a/>").unwrap();
-        assert!(outside.parser_reaction().contains("another file"));
-        for none in ["<a><!-- <!DOCTYPE a> --></a>", "<!-- <!DOCTYPE a> --><a/>", "", "<a/>"] {
-            assert!(found(none).is_none(), "{none}");
-        }
-    }
-}

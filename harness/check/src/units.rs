@@ -359,30 +359,3 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn one(name: &str) -> Unit {
-        read(name).first().copied().unwrap_or_else(|| panic!("{name} is not read"))
-    }
-
-    #[test]
-    fn unit_names_are_read_by_the_rules_of_modelica() {
-        assert_eq!(one("N.m").exponents, [1, 2, -2, 0, 0, 0, 0, 0]);
-        assert_eq!(one("kg.m2/s2"), one("J"));
-        assert_eq!(one("W/(m2.K)").exponents, [1, 0, -3, 0, -1, 0, 0, 0]);
-        assert_eq!(one("1/s").exponents[2], -1);
-        assert_eq!(one("s-1"), one("1/s"));
-        assert!(is_equal(one("km/h").factor, 1.0 / 3.6));
-        assert!(is_equal(one("deg/h").factor, PI / 180.0 / 3600.0));
-        assert!(is_equal(one("mm2").factor, 1e-6) && is_equal(one("cm3").factor, 1e-6));
-        assert!(is_equal(one("mbar").factor, 100.0) && is_equal(one("kWh").factor, 3.6e6));
-        assert_eq!(one("min").factor, 60.0); // not a thousandth of an inch
-        assert_eq!(one("kg").factor, 1.0);
-        for unread in ["", "foo", "W/m2.K", "m/s/s", "m2/", "(m", "m)", "m^", "N m", "m2x"] {
-            assert_eq!(read(unread), [], "{unread}");
-        }
-    }
-}

@@ -2,12 +2,15 @@
 
 use std::io::Cursor;
 
+use check::{Findings, Severity, portable};
 use host::fmi2::PLATFORM;
 use host::xml::Element;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::common::{XML, binary, breaks, broken_rules, check_bytes, our_files, with, xml, zipped};
+use crate::common::{
+    XML, archive, binary, breaks, broken_rules, check_bytes, our_files, with, xml, zipped,
+};
 
 #[test]
 fn the_check_reports_archives_that_hosts_cannot_read() {
@@ -202,5 +205,39 @@ fn a_report_without_a_checked_rule_is_an_error_in_sarif_and_junit() {
         assert_eq!((root.get("errors"), root.children[0].get("errors")), (Some("1"), Some("1")));
         let case = root.children[0].children.last().unwrap();
         assert_eq!((case.get("name"), &*case.children[0].name), (Some("check"), "error"));
+    }
+}
+
+#[test]
+fn file_names_that_windows_cannot_have_are_found() {
+    let wrong = ["CON", "nul.txt", "com1", "LPT9.a.b", "a.", "a ", "a?b", "a:b", "aux .c"];
+    let right = ["CONE", "com", "com0", "com10", "a.b", ".a", "a b", "nulled.txt", "lptx"];
+    for name in [wrong, right].concat() {
+        let mut findings = Findings::new(Severity::Error);
+        portable::windows_names(&archive(&[(name, "")]), &mut findings);
+        assert_eq!(findings.list.len(), usize::from(wrong.contains(&name)), "{name}");
+    }
+}
+
+#[test]
+fn folder_names_of_the_standard_in_wrong_capitals_are_reported() {
+    let found = |name| {
+        let mut findings = Findings::new(Severity::Error);
+        portable::capitals(&archive(&[(name, "")]), &mut findings);
+        let text = findings.list.first()?.text.clone();
+        let (_, right) = text.split_once("FMI writes ")?;
+        Some(right.split(' ').next()?.to_string())
+    };
+    for (wrong, right) in [
+        ("Binaries/Linux64/a.so", "binaries/linux64/a.so"),
+        ("binaries/Win64/a.dll", "binaries/win64/a.dll"),
+        ("binaries/AArch64-linux/a.so", "binaries/aarch64-linux/a.so"),
+        ("ModelDescription.xml", "modelDescription.xml"),
+        ("Resources/a", "resources/a"),
+    ] {
+        assert_eq!(found(wrong).as_deref(), Some(right));
+    }
+    for right in ["binaries/linux64/A.so", "resources/Binaries/a", "Extras/a", "Documentation"] {
+        assert_eq!(found(right), None, "{right}");
     }
 }

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use check::binaries::platform;
 use check::{RULES, Severity};
+use host::binary::Kind;
 use host::fmi2::PLATFORM;
 use pack::packed_for_tests;
 use zip::CompressionMethod;
@@ -145,4 +147,21 @@ fn a_check_that_could_not_call_the_fmu_states_this_in_its_report() {
     let expected = BTreeSet::from(["zip.capitals", "bin.this_platform"]);
     assert_eq!(broken_rules(&report), expected, "{}", report.text());
     assert!(report.count_findings(Severity::Error) > 0);
+}
+
+#[test]
+fn binary_folders_are_recognised_as_platforms_tuples_or_vendor_names() {
+    for (folder, ending, kind) in [
+        ("linux64", ".so", Some(Kind::Linux)),
+        ("win32", ".dll", None),
+        ("aarch64-linux-gnu", ".so", Some(Kind::LinuxArm)),
+        ("aarch64-darwin", ".dylib", Some(Kind::MacOs)),
+        ("x86_64-windows-msvc143", ".dll", Some(Kind::Windows)),
+        ("aarch32-linux-gnueabihf", ".so", None),
+    ] {
+        assert_eq!(platform(folder), Some((ending, kind)), "{folder}");
+    }
+    for vendors in ["VisualStudio8", "gcc4", "arm-linux-gnueabihf", "linux-64", "x86_64"] {
+        assert_eq!(platform(vendors), None, "{vendors}");
+    }
 }

@@ -7,7 +7,7 @@ use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 
-use check::{Options, Report};
+use check::{Archive, Options, Report};
 use host::fmi2::PLATFORM;
 use pack::packed_for_tests;
 use zip::write::SimpleFileOptions;
@@ -41,6 +41,15 @@ pub fn zipped(files: &Files, method: CompressionMethod) -> Vec<u8> {
         to.write_all(bytes).unwrap();
     }
     to.finish().unwrap().into_inner()
+}
+
+/// Returns the archive with these files, each a name and a text, as the rules read it.
+pub fn archive(files: &[(&str, &str)]) -> Archive {
+    let files = files.iter().map(|(name, text)| (name.to_string(), text.as_bytes().to_vec()));
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.fmu");
+    std::fs::write(&path, zipped(&files.collect(), CompressionMethod::Stored)).unwrap();
+    Archive::read(&path).unwrap()
 }
 
 pub fn binary() -> String {

@@ -6,4 +6,8 @@ mod binaries;
 mod common;
 mod descriptions;
 mod fmi3;
+#[cfg(unix)]
+mod process;
+mod reading;
+mod report;
 mod small;
