@@ -54,30 +54,9 @@ pub fn noise_level(signal: &[f64]) -> f64 {
     white.max(rounding)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mean_variance_quantiles_and_correlation_of_four_values_are_exact() {
-        let values = [1.0, -4.0, 2.0, 5.0];
-        assert_eq!((mean(&values), variance(&values), peak(&values)), (1.0, 10.5, 5.0));
-        assert_eq!((median(&values), quantile(&values, 0.2)), (Some(2.0), Some(-4.0)));
-        assert!((correlation(&values, &[-1.0, 4.0, -2.0, -5.0]) + 1.0).abs() < 1e-15);
-        assert!(median(&[]).is_none() && peak(&[]) == 0.0 && deviation(&values) == 10.5f64.sqrt());
-    }
-
-    #[test]
-    fn the_noise_level_of_a_signal_excludes_its_motion_at_a_few_hertz() {
-        let mut random = crate::random::Random::new(1, 0);
-        let noisy: Vec<f64> = (0..15_000)
-            .map(|k| 0.02 * (0.3 * f64::from(k)).sin() + 4e-4 * random.normal())
-            .collect();
-        let quantised: Vec<f64> = noisy.iter().map(|y| (y / 0.01).round() * 0.01).collect();
-        // the median of 15,000 squares has a relative standard error of 2 %; the third difference of the motion is
-        // 0.3³ of 20 mrad/s
-        let level = noise_level(&noisy);
-        assert!((level / 4e-4 - 1.0).abs() < 0.2, "{level}");
-        assert!(noise_level(&quantised) >= 0.01 / 12f64.sqrt());
-    }
+/// Returns the mean of each window of `width` successive values.
+pub fn running_mean(x: &[f64], width: usize) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    x.iter().for_each(|x| sums.push(sums[sums.len() - 1] + x));
+    (width..sums.len()).map(|end| (sums[end] - sums[end - width]) / width as f64).collect()
 }

@@ -33,7 +33,7 @@ const RATIO: usize = 32;
 /// noise. For each pair of averaging times and each lag it contains the weight of the lag. It also
 /// contains, for each term of the noise with the coefficient 1, the covariance of the second
 /// differences of the gyro's angle over the two averaging times.
-pub(super) struct Covariance {
+pub struct Covariance {
     terms: Vec<Term>,
     size: usize,
     pairs: Vec<Pair>,
