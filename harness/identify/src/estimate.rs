@@ -76,16 +76,3 @@ pub(crate) fn fit_percent(residual: &[f64], measured: &[f64]) -> f64 {
 pub fn prose(unit: &str) -> String {
     unit.replace('.', "·").replace('2', "²")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_open_end_of_an_interval_is_null_in_json() {
-        let open =
-            Estimated { interval: [0.02, f64::INFINITY], ..Estimated::normal(0.1, 0.2, "rad/s") };
-        let json = serde_json::to_value(&open).unwrap();
-        assert_eq!(json["interval"], serde_json::json!([0.02, null]));
-    }
-}

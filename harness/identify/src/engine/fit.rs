@@ -409,7 +409,8 @@ struct Column {
     step: (f64, f64),
 }
 
-pub(super) fn check_finite(values: &[f64], name: &str) -> Result<()> {
+/// Refuses `values`, the derivatives of the outputs by the unknown `name`, if one of them is NaN or infinite.
+pub fn check_finite(values: &[f64], name: &str) -> Result<()> {
     if values.iter().map(|v| v * v).sum::<f64>().is_finite() {
         return Ok(());
     }

@@ -101,7 +101,7 @@ fn sides<'v>(values: &'v [f64], gaps: &[usize], from: usize, to: usize) -> [&'v 
 
 /// Estimates the error of filling a gap of `lost` samples by trials: known samples in other places are removed and predicted.
 /// Returns the root mean square of the summed errors, infinite if no trial is possible.
-fn trial_error(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
+pub fn trial_error(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     let side = 4 * GAP_ORDER;
     let room = values.len().saturating_sub(2 * side + lost);
     let mut squares = Vec::new();
@@ -122,7 +122,7 @@ fn trial_error(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
 
 /// Predicts the `lost` samples of the torque between the samples on the `left` and on the `right`; `None` if these
 /// samples are too few.
-fn fill([left, right]: [&[f64]; 2], lost: usize) -> Option<Vec<f64>> {
+pub fn fill([left, right]: [&[f64]; 2], lost: usize) -> Option<Vec<f64>> {
     let order = GAP_ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
     if order < 4 {
         return None;
@@ -199,31 +199,4 @@ fn with_rows(
     let place = |row: usize| rows.iter().position(|of| of.own == Some(row)).unwrap_or(row);
     let cuts = cuts.into_iter().map(place).collect();
     (all.with_rows(&rows), cuts)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sweep(t: f64) -> f64 {
-        0.1 * (std::f64::consts::TAU * (1.5 + 0.005 * t) * t).sin()
-    }
-
-    /// Gaps of 1, 10 and 50 samples in a sweep are predicted within 1e-4 of the amplitude. Gaps in white noise are not filled.
-    #[test]
-    fn lost_samples_of_a_sweep_are_predicted_and_lost_samples_of_noise_are_not() {
-        let values: Vec<f64> = (0..4000).map(|k| sweep(100.0 + 0.02 * f64::from(k))).collect();
-        for lost in [1, 10, 50] {
-            let found =
-                fill([&values[1000..1250], &values[1250 + lost..1500 + lost]], lost).unwrap();
-            let off = found.iter().zip(&values[1250..]).map(|(a, b)| (a - b).abs());
-            let worst = off.fold(0.0, f64::max);
-            assert!(worst < 1e-3 * 0.1, "{lost}: {worst:e}");
-        }
-        assert!(trial_error(&values, &[], 10) < 1e-4);
-        // a torque that jumps from row to row is not predictable
-        let mut random = analysis::random::Random::new(1, 0);
-        let noise: Vec<f64> = (0..4000).map(|_| 0.1 * random.normal()).collect();
-        assert!(trial_error(&noise, &[], 10) > 0.1);
-    }
 }

@@ -92,7 +92,7 @@ impl Recording {
     }
 
     /// Returns the rows `from..to` as a recording. Its initial state is unknown, because it begins in the middle of a motion.
-    pub(crate) fn rows(&self, from: usize, to: usize) -> Recording {
+    pub fn rows(&self, from: usize, to: usize) -> Recording {
         let part = self.mapped(|x| x[from..to].to_vec(), |mask| Some(mask[from..to].to_vec()));
         Recording { from_rest: false, ..part }
     }
@@ -287,7 +287,7 @@ pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()>
 /// Returns the rows with a new value if the rows between them only repeat values, as with a gyro that is slower than the
 /// recording. A gyro with a coarse resolution may repeat values by chance; then only changes in every n-th row count as a slower
 /// clock. If the resolution is fine, so that two values are seldom equal, every repeated value counts.
-pub(crate) fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
+pub fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
     let changes: Vec<usize> = (1..rate.len()).filter(|&k| rate[k] != rate[k - 1]).collect();
     if changes.len() < 10 || changes.len() > 9 * rate.len() / 10 {
         return None;
