@@ -129,35 +129,3 @@ fn sweep(parent: &Path, prefix: &str) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn temporary_folders_of_ended_programs_are_removed_and_others_stay() {
-        let parent = tempfile::tempdir().unwrap();
-        let [dead, living, other] = ["hubslosh-dead", "hubslosh-living", "hubslosh-other"]
-            .map(|name| parent.path().join(name));
-        for folder in [&dead, &living, &other] {
-            fs::create_dir_all(folder.join(FILES)).unwrap();
-        }
-        File::create(dead.join(ALIVE)).unwrap();
-        let held = File::create(living.join(ALIVE)).unwrap();
-        held.lock().unwrap();
-        sweep(parent.path(), PREFIX);
-        assert!(!dead.exists() && living.exists());
-        assert!(other.exists(), "a folder without the file alive belongs to another program");
-    }
-
-    #[test]
-    fn a_dropped_temporary_folder_is_removed() {
-        let folder = Folder::new().unwrap();
-        let path = folder.path().to_path_buf();
-        fs::write(path.join("a"), "a").unwrap();
-        assert!(paths().iter().any(|registered| path.starts_with(registered)));
-        drop(folder);
-        assert!(!path.parent().unwrap().exists());
-        assert!(!paths().iter().any(|registered| path.starts_with(registered)));
-    }
-}
