@@ -220,7 +220,16 @@ impl Draining {
             tanks.iter().enumerate().map(|(i, tank)| index::bob(i, 0)..index::bob(i, tank.modes()));
         let spins = tanks_with_spin(&tanks).map(|(i, _)| index::spin(i)..index::spin(i + 1));
         let flexing = [index::ETA, index::ETA_DOT].map(|at| at..at + p.appendages);
-        let always = [0..index::BOBS, index::LIQUID..index::BALLS];
+        let before = core::iter::once(0..index::BOBS).chain(bobs);
+        let after = core::iter::once(index::LIQUID..index::BALLS).chain(spins).chain(flexing);
+        // Adjacent ranges are joined, because the solver handles each range in a loop of its own.
+        let mut moving: Vec<Range<usize>> = Vec::new();
+        for part in before.chain(after).filter(|part| !part.is_empty()) {
+            match moving.last_mut().filter(|last| last.end == part.start) {
+                Some(last) => last.end = part.end,
+                None => moving.push(part),
+            }
+        }
         Some(Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
@@ -228,13 +237,7 @@ impl Draining {
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
             appendages,
             follows: tanks.iter().any(MountedTank::follows),
-            moving: always
-                .into_iter()
-                .chain(bobs)
-                .chain(spins)
-                .chain(flexing)
-                .filter(|part| !part.is_empty())
-                .collect(),
+            moving,
             tanks,
         })
     }

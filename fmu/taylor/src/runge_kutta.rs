@@ -219,85 +219,86 @@ fn is_short(h: f64, error: f64) -> bool {
     h < 1.0 && h * h * h * h * h < error
 }
 
-/// Copies the ranges `moving` of the array `x` one after the other to the start of `packed`. Returns their total length.
-fn pack<const D: usize>(moving: &[Range<usize>], x: &[f64; D], packed: &mut [f64; D]) -> usize {
-    moving.iter().fold(0, |at, part| {
-        packed[at..at + part.len()].copy_from_slice(&x[part.clone()]);
-        at + part.len()
-    })
-}
-
-/// Copies the elements of `packed` back to their ranges `moving` of the array `x`.
-fn unpack<const D: usize>(moving: &[Range<usize>], packed: &[f64; D], x: &mut [f64; D]) {
-    moving.iter().fold(0, |at, part| {
-        x[part.clone()].copy_from_slice(&packed[at..at + part.len()]);
-        at + part.len()
-    });
-}
-
-/// Sets `sum` to the sum of the rates `k` with the `weights`. Two rates are added at once, which
-/// saves loads and stores of the sum.
-fn combine<const D: usize>(weights: Weights, k: &[[f64; D]], sum: &mut [f64]) {
+/// Sets the elements of `sum` in the range `part` to the sum of the rates `k` with the `weights`. Several rates are added at
+/// once, which saves loads and stores of the sum.
+fn combine<const D: usize>(
+    weights: Weights,
+    k: &[[f64; D]],
+    part: &Range<usize>,
+    sum: &mut [f64; D],
+) {
+    let sum = &mut sum[part.clone()];
+    let k = |stage: usize| &k[stage][part.clone()];
     sum.fill(0.0);
-    let k = |stage: usize, n: usize| k[stage][..n].iter();
-    let (pairs, last) = weights.as_chunks::<2>();
+    let (fours, rest) = weights.as_chunks::<4>();
+    for [(r, u), (s, v), (t, w), (q, y)] in fours {
+        let rates = k(*r).iter().zip(k(*s)).zip(k(*t).iter().zip(k(*q)));
+        for (sum, ((a, b), (c, d))) in sum.iter_mut().zip(rates) {
+            *sum = *sum + u * a + v * b + w * c + y * d;
+        }
+    }
+    let (pairs, last) = rest.as_chunks::<2>();
     for [(s, v), (t, w)] in pairs {
-        let n = sum.len();
-        for (sum, (a, b)) in sum.iter_mut().zip(k(*s, n).zip(k(*t, n))) {
+        for (sum, (a, b)) in sum.iter_mut().zip(k(*s).iter().zip(k(*t))) {
             *sum = *sum + v * a + w * b;
         }
     }
     for (s, v) in last {
-        let n = sum.len();
-        for (sum, a) in sum.iter_mut().zip(k(*s, n)) {
+        for (sum, a) in sum.iter_mut().zip(k(*s)) {
             *sum += v * a;
         }
     }
 }
 
-/// State and rates at the start of a step, the states in use (packed), and their allowed errors.
+/// States and rates at the start of a step, and the allowed errors of the states in use.
 struct Start<'a, const D: usize> {
     x: &'a [f64; D],
-    packed: &'a [f64],
     first: &'a [f64; D],
-    allowed: &'a [f64],
+    allowed: &'a [f64; D],
 }
 
-/// Tries a step of the length `h` from `start`, which is at the time `t`. Returns the new states,
-/// and their estimated error divided by the allowed error. Returns `None` if a state diverges.
+/// Tries a step of the length `h` from `start`, which is at the time `t`. Writes the new states to `moved`, and returns
+/// their estimated error divided by the allowed error. Returns `None` if a state diverges. States that are not in use must
+/// have the same values in `moved` as in `start.x`.
 fn try_step<const D: usize, const S: usize>(
     system: &impl System<D>,
     method: &Method<S>,
     start: &Start<D>,
     (t, h): (f64, f64),
-) -> Option<([f64; D], f64)> {
-    let (moving, n) = (system.moving(), start.packed.len());
-    let (mut k, mut now, mut rate, mut sum) = ([*start.first; S], *start.x, [0.0; D], [0.0; D]);
-    let mut move_to = |weights: Weights, k: &[[f64; D]; S], now: &mut [f64; D]| {
-        combine(weights, k, &mut sum[..n]);
+    moved: &mut [f64; D],
+) -> Option<f64> {
+    let moving = system.moving();
+    let mut k = [*start.first; S];
+    let move_to = |weights: Weights, k: &[[f64; D]; S], now: &mut [f64; D]| {
         let mut is_bounded = true;
-        for (sum, x) in sum[..n].iter_mut().zip(start.packed) {
-            *sum = x + h * *sum;
-            is_bounded &= sum.abs() < MAX_MAGNITUDE;
+        for part in moving {
+            combine(weights, k, part, now);
+            for (now, x) in now[part.clone()].iter_mut().zip(&start.x[part.clone()]) {
+                *now = x + h * *now;
+                is_bounded &= now.abs() < MAX_MAGNITUDE;
+            }
         }
-        unpack(moving, &sum, now);
         is_bounded.then_some(())
     };
     for (s, (node, weights)) in method.stages.iter().enumerate() {
-        move_to(weights, &k, &mut now)?;
-        system.write_rates(t + node * h, &now, &mut rate);
-        pack(moving, &rate, &mut k[s + 1]);
+        move_to(weights, &k, moved)?;
+        system.write_rates(t + node * h, moved, &mut k[s + 1]);
     }
-    move_to(method.result, &k, &mut now)?;
+    move_to(method.result, &k, moved)?;
+    let mut sum = [0.0; D];
     let [error, second] = method.errors.map(|weights| {
-        let sum = &mut sum[..if weights.is_empty() { 0 } else { n }];
-        combine(weights, &k, sum);
-        let errors = sum.iter().zip(start.allowed).map(|(sum, allowed)| (h * sum).abs() / allowed);
-        // An error that is NaN counts as the largest error.
-        errors.fold(0.0, |most, off| if off <= most { most } else { f64::min(off, LARGEST_ERROR) })
+        let parts = if weights.is_empty() { &[] } else { moving };
+        parts.iter().fold(0.0, |most, part| {
+            combine(weights, &k, part, &mut sum);
+            let errors = sum[part.clone()].iter().zip(&start.allowed[part.clone()]);
+            // An error that is NaN counts as the largest error.
+            errors.map(|(sum, allowed)| (h * sum).abs() / allowed).fold(most, |most, off| {
+                if off <= most { most } else { f64::min(off, LARGEST_ERROR) }
+            })
+        })
     });
     let error = f64::max(error, LEAST_ERROR);
-    Some((now, method.margin * error * (error / libm::hypot(error, 0.1 * second))))
+    Some(method.margin * error * (error / libm::hypot(error, 0.1 * second)))
 }
 
 /// Step control of a call, which is kept if the call consists of several integrations by
@@ -329,28 +330,27 @@ pub fn advance<const D: usize>(
     pace: &mut Pace,
 ) -> Result<(), StepError> {
     let (mut t, moving) = (begin, system.moving());
-    let [mut rate, mut packed, mut first, mut allowed] = [[0.0; D]; 4];
+    let (mut first, mut moved) = ([0.0; D], *x);
     while t < end {
-        system.write_rates(t, x, &mut rate);
-        let n = pack(moving, x, &mut packed);
-        pack(moving, &rate, &mut first);
-        pack(moving, &system.error_scale(t, x, &rate, end - t), &mut allowed);
-        for scale in &mut allowed[..n] {
+        system.write_rates(t, x, &mut first);
+        let mut allowed = system.error_scale(t, x, &first, end - t);
+        for i in moving.iter().cloned().flatten() {
+            let scale = &mut allowed[i];
             let rounding = ROUNDING * f64::max(*scale, 1.0);
             *scale = f64::max(STEP_SHARE * tolerance * *scale, rounding);
         }
-        let moved = loop {
+        loop {
             pace.steps.add_steps(1, t)?;
             let is_last = t + pace.h >= end;
             let h = if is_last { end - t } else { pace.h };
             let is_short = !pace.is_fast && is_short(h, STEP_SHARE * tolerance);
-            let start = Start { x, packed: &packed[..n], first: &first, allowed: &allowed[..n] };
-            let (trial, order) = if is_short {
-                (try_step(system, &SHORT, &start, (t, h)), SHORT.order)
+            let start = Start { x, first: &first, allowed: &allowed };
+            let (error, order) = if is_short {
+                (try_step(system, &SHORT, &start, (t, h), &mut moved), SHORT.order)
             } else {
-                (try_step(system, &LONG, &start, (t, h)), LONG.order)
+                (try_step(system, &LONG, &start, (t, h), &mut moved), LONG.order)
             };
-            let (moved, error) = trial.unwrap_or((*x, LARGEST_ERROR));
+            let error = error.unwrap_or(LARGEST_ERROR);
             let change = 0.9 * libm::pow(error, -1.0 / order);
             let best = h * change.clamp(SHORTER, LONGER);
             if error <= 1.0 {
@@ -358,7 +358,7 @@ pub fn advance<const D: usize>(
                 // the step before it.
                 pace.h = if is_last { f64::max(best, pace.h) } else { best };
                 t = if is_last { end } else { t + h };
-                break moved;
+                break;
             }
             if is_short {
                 pace.is_fast = true;
@@ -368,8 +368,10 @@ pub fn advance<const D: usize>(
             if t + pace.h <= t {
                 return Err(StepError::NotFinite { time: t });
             }
-        };
-        *x = moved;
+        }
+        for part in moving {
+            x[part.clone()].copy_from_slice(&moved[part.clone()]);
+        }
     }
     Ok(())
 }
@@ -446,8 +448,9 @@ mod tests {
         advance(&orbit, &mut exact, (0.0, h), 1e-14, &mut Pace::new(h / 4.0, STEPS)).unwrap();
         let mut first = START;
         orbit.write_rates(0.0, &START, &mut first);
-        let start = Start { x: &START, packed: &START, first: &first, allowed: &[1.0; 4] };
-        let (x, estimate) = try_step(&orbit, method, &start, (0.0, h)).unwrap();
+        let start = Start { x: &START, first: &first, allowed: &[1.0; 4] };
+        let mut x = START;
+        let estimate = try_step(&orbit, method, &start, (0.0, h), &mut x).unwrap();
         [(0..4).map(|i| (x[i] - exact[i]).abs()).fold(0.0, f64::max), estimate]
     }
 
