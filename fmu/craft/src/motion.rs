@@ -460,7 +460,7 @@ impl CraftMotion {
     pub fn axial_interval(&self, tank: usize, inputs: &Inputs) -> Option<[f64; 2]> {
         let Kept { clock, start, .. } = self.state.kept;
         let orders = self.expansion.orders();
-        if orders == 0 || !inputs.are_held() || !self.state.kept.is_continued(inputs) {
+        if orders == 0 || !self.state.kept.is_continued(inputs, 0.0) {
             return None;
         }
         let Some(bob) = self.bobs.iter().find(|bob| bob.tank == tank && bob.mode == 0) else {
@@ -488,19 +488,25 @@ impl CraftMotion {
         self.expansion.clear();
     }
 
-    /// Advances the states by `h` > 0, s. If the inputs have jumped (`has_jumped`), the step starts
-    /// from the present states, otherwise from the states in the field `before`. If an error is
-    /// returned, the states are invalid, and the expansion in `state.kept` is unchanged.
+    /// Advances the states by `h` > 0, s: with `is_continued` by the expansion in `state.kept`, and otherwise by a new
+    /// expansion. If the inputs have jumped (`has_jumped`), it starts from the present states, otherwise from the states in
+    /// the field `before`. If an error is returned, the states are invalid, and the expansion in `state.kept` is unchanged.
     // The preparation of a step is a function of its own, because both take more instructions if they are compiled together.
     #[inline(never)]
-    pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
-        let (begin, mut steps) = (self.state.time, limits.steps());
-        let (are_held, changing) = (self.inputs.are_held(), self.changing);
-        let State { x, kept, .. } = &mut self.state;
+    pub fn advance(
+        &mut self,
+        h: f64,
+        (is_continued, has_jumped): (bool, bool),
+        limits: Limits,
+    ) -> Result<(), StepError> {
+        let (mut steps, changing) = (limits.steps(), self.changing);
+        let State { x, kept, time, .. } = &mut self.state;
+        let time = *time;
         let (mut clock, mut start) = ([0.0; 2], [0.0; 2]);
-        if are_held && !has_jumped && kept.is_continued(&self.inputs) {
+        if is_continued {
             x[..changing].copy_from_slice(&kept.x[..changing]);
             (clock, start) = (kept.clock, kept.start);
+            self.inputs = kept.inputs();
             self.start = Start::Kept;
         } else {
             self.expansion.clear();
@@ -509,14 +515,12 @@ impl CraftMotion {
                 self.keep();
             }
         }
+        let origin = time - clock[0];
         clock = add_time(clock, h);
-        let (times, tolerance) = ((clock[0], &mut start), limits.tolerance);
-        integrator::advance_kept(self, times, begin, tolerance, &mut steps)?;
+        let times = (clock[0], &mut start);
+        integrator::advance_kept(self, times, limits.tolerance, &mut steps)
+            .map_err(|why| why.delayed(origin))?;
         let State { x, kept, .. } = &mut self.state;
-        if !are_held {
-            kept.end();
-            return Ok(());
-        }
         if !kept.is_used() {
             kept.x = *x;
         }
@@ -849,7 +853,7 @@ impl Motion for CraftMotion {
             finite &= self.take_apart(n, h, w)?;
         }
         if !finite {
-            return Err(StepError::NotFinite { time: self.state.time + t });
+            return Err(StepError::NotFinite { time: t });
         }
         if let Some((lump, due)) = self.due.take() {
             self.change(lump, due, t);

@@ -137,18 +137,24 @@ impl Spacecraft {
         let (time, h_wheels, flow, ball, changing) = (*time, *h_wheels, *flow, *ball, *changing);
         before[..changing].copy_from_slice(&x[..changing]);
         self.motion.inputs = *inputs;
-        let has_jumped = self.may_jump(inputs) && self.take_jumps(inputs);
+        let drains = self.draining.as_ref().is_some_and(|craft| craft.drains());
+        let is_continued = !drains && self.motion.state.kept.is_continued(inputs, h);
+        let has_jumped = !is_continued && self.may_jump(inputs) && self.take_jumps(inputs);
         let done = match &self.draining {
-            Some(craft) if craft.drains() => {
+            Some(craft) if drains => {
                 let x = &mut self.motion.state.x;
                 Run { craft, inputs }.advance(x, time, h, self.limits)
             }
-            _ => self.motion.advance(h, has_jumped, self.limits),
+            _ => self.motion.advance(h, (is_continued, has_jumped), self.limits),
         };
-        let CraftMotion { state, before, .. } = &mut *self.motion;
+        let CraftMotion { state, before, inputs: ramps, .. } = &mut *self.motion;
         if done.is_ok() {
             state.time = time + h;
-            state.h_wheels = inputs.h_wheels.value_at(h);
+            // The momentum follows from the start of its ramp, so that its rounding error does not depend on the steps.
+            state.h_wheels = match drains {
+                true => inputs.h_wheels.value_at(h),
+                false => ramps.h_wheels.value_at(state.kept.clock[0]),
+            };
             state.flow = inputs.mass_flow.map(|flow| flow.value_at(h));
         } else {
             state.x[..changing].copy_from_slice(&before[..changing]);

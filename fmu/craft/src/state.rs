@@ -3,7 +3,7 @@
 use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
-use taylor::vector::Vec3;
+use taylor::vector::{self, Vec3};
 
 use crate::sizes::{APPENDAGES, MODES, TANKS};
 
@@ -161,37 +161,75 @@ pub struct State {
     pub(crate) kept: Kept,
 }
 
-/// Start of the power series (expansion) that the next step continues if the inputs have not changed: the states `x` and the
-/// inputs (force, torque, h_wheels, mass flows) at this start. `clock` is the time at the end of the last step and `start` the
-/// time at the start of the expansion; both count from the last change of the inputs, and the second number of each is its
-/// rounding error. If `clock` is 0, the next step starts a new expansion, and the other fields have no meaning.
+/// Start of the power series (expansion) that the next step continues if the inputs have not changed or follow their ramps:
+/// the states `x` at this start. `clock` is the time at the end of the last step and `start` the time at the start of the
+/// expansion; both count from the last jump of an input or a slope, and the second number of each is its rounding error.
+/// `inputs` and `slopes` (of force, torque, h_wheels and mass flows) are those at this jump. If `clock` is 0, the next step
+/// starts a new expansion, and the other fields have no meaning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Kept {
     pub x: [f64; STATES],
     pub clock: [f64; 2],
     pub start: [f64; 2],
     inputs: [f64; INPUTS],
+    slopes: [f64; INPUTS],
 }
 
 impl Kept {
-    const REALS: usize = STATES + 4 + INPUTS;
+    const REALS: usize = STATES + 4 + 2 * INPUTS;
 
     /// Value without an expansion, after which the next step starts a new one.
-    pub const NONE: Kept =
-        Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
+    pub const NONE: Kept = Kept {
+        x: [0.0; STATES],
+        clock: [0.0; 2],
+        start: [0.0; 2],
+        inputs: [0.0; INPUTS],
+        slopes: [0.0; INPUTS],
+    };
 
     #[inline(always)]
     pub fn is_used(&self) -> bool {
         self.clock[0] > 0.0
     }
 
-    /// Returns true if the next step continues the expansion, because `inputs` are constant over the step
-    /// and have not changed.
+    /// Returns true if the next step, of the length `h` (s), continues the expansion, because `inputs` are constant and have
+    /// not changed, or follow their ramps during the step within rounding errors.
     #[inline(always)]
-    pub fn is_continued(&self, inputs: &Inputs) -> bool {
+    pub fn is_continued(&self, inputs: &Inputs, h: f64) -> bool {
+        if !inputs.are_held() {
+            return self.is_used() && self.is_followed(inputs, h);
+        }
         // The comparison has no branches, which saves a hundred instructions.
         let same = |all, (a, b): (&f64, &f64)| all & (a == b);
-        self.is_used() && self.inputs.iter().zip(&inputs.values()).fold(true, same)
+        self.is_used()
+            && self.inputs.iter().zip(&inputs.values()).fold(true, same)
+            && self.slopes == [0.0; INPUTS]
+    }
+
+    /// Compares the inputs at the start and at the end of the next step with their ramps. A host computes both with rounding
+    /// errors, also the slope, as a difference of two values. An input whose ramp has no slope must have its value exactly.
+    #[inline(never)]
+    fn is_followed(&self, inputs: &Inputs, h: f64) -> bool {
+        let clock = self.clock[0];
+        let ramps = self.inputs.iter().zip(&self.slopes);
+        ramps.zip(inputs.values().iter().zip(&inputs.slopes())).all(|((x, slope), (now, rate))| {
+            let rounding = if *slope == 0.0 { 0.0 } else { 8.0 * f64::EPSILON };
+            let allowed = rounding * (x.abs() + slope.abs() * (clock + h));
+            [(0.0, clock), (h, clock + h)]
+                .iter()
+                .all(|(h, t)| (now + rate * h - (x + slope * t)).abs() <= allowed)
+        })
+    }
+
+    /// Returns the inputs at the time 0 of the clock.
+    pub fn inputs(&self) -> Inputs {
+        let at = |i: usize| Line { value: self.inputs[i], slope: self.slopes[i] };
+        let ramp = |i: usize| Ramp {
+            value: vector::part(&self.inputs, i),
+            slope: vector::part(&self.slopes, i),
+        };
+        let mass_flow = core::array::from_fn(|i| at(9 + i));
+        Inputs { force: ramp(0), torque: ramp(3), h_wheels: ramp(6), mass_flow }
     }
 
     /// Stores the start of a new expansion: its `inputs` and the states `x`. States after the last
@@ -199,7 +237,7 @@ impl Kept {
     #[inline(always)]
     pub fn renew(&mut self, x: &[f64], inputs: &Inputs) {
         self.x[..x.len()].copy_from_slice(x);
-        self.inputs = inputs.values();
+        (self.inputs, self.slopes) = (inputs.values(), inputs.slopes());
     }
 
     /// Discards the expansion, so that the next step starts a new one.
@@ -208,16 +246,18 @@ impl Kept {
     }
 
     fn numbers(&self) -> impl Iterator<Item = &f64> {
-        let Kept { x, clock, start, inputs } = if self.is_used() { self } else { &Kept::NONE };
-        clock.iter().chain(start).chain(inputs).chain(x)
+        let Kept { x, clock, start, inputs, slopes } =
+            if self.is_used() { self } else { &Kept::NONE };
+        clock.iter().chain(start).chain(inputs).chain(slopes).chain(x)
     }
 
     fn from_numbers(numbers: &[f64; Self::REALS]) -> Option<Kept> {
         let (clock, rest) = numbers.split_first_chunk()?;
         let (start, rest) = rest.split_first_chunk()?;
-        let (inputs, x) = rest.split_first_chunk()?;
+        let (inputs, rest) = rest.split_first_chunk()?;
+        let (slopes, x) = rest.split_first_chunk()?;
         let x = *x.first_chunk()?;
-        let kept = Kept { x, clock: *clock, start: *start, inputs: *inputs };
+        let kept = Kept { x, clock: *clock, start: *start, inputs: *inputs, slopes: *slopes };
         (!kept.is_used() || has_directions(&x)).then_some(kept)
     }
 }
@@ -238,14 +278,23 @@ impl Inputs {
 
     #[inline(always)]
     fn values(&self) -> [f64; INPUTS] {
-        let mut all = [0.0; INPUTS];
-        let vectors = [self.force.value, self.torque.value, self.h_wheels.value];
-        all[..9].copy_from_slice(vectors.as_flattened());
-        for (x, flow) in all[9..].iter_mut().zip(&self.mass_flow) {
-            *x = flow.value;
-        }
-        all
+        let Inputs { force, torque, h_wheels, mass_flow } = self;
+        in_order([force.value, torque.value, h_wheels.value], mass_flow.map(|flow| flow.value))
     }
+
+    #[inline(always)]
+    fn slopes(&self) -> [f64; INPUTS] {
+        let Inputs { force, torque, h_wheels, mass_flow } = self;
+        in_order([force.slope, torque.slope, h_wheels.slope], mass_flow.map(|flow| flow.slope))
+    }
+}
+
+#[inline(always)]
+fn in_order(vectors: [Vec3; 3], flows: [f64; TANKS]) -> [f64; INPUTS] {
+    let mut all = [0.0; INPUTS];
+    all[..9].copy_from_slice(vectors.as_flattened());
+    all[9..].copy_from_slice(&flows);
+    all
 }
 
 impl State {

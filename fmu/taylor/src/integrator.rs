@@ -336,7 +336,7 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
     [total, rest - (total - sum)]
 }
 
-/// An expansion that calls of [`advance_kept`] continue while the inputs are constant. Each call computes as many orders as
+/// An expansion that calls of [`advance_kept`] continue while the inputs are constant or keep their slopes. Each call computes as many orders as
 /// its end needs. The state at an instant depends only on the start of the expansion and on the time since this start, and
 /// not on the times at which earlier calls have ended.
 #[derive(Clone, Debug)]
@@ -388,8 +388,7 @@ impl Expansion {
     }
 }
 
-/// Computes the overwritten coefficients of the expansion again. The expansion starts at the time `t`, s, after the
-/// start of the call.
+/// Computes the overwritten coefficients of the expansion again. The expansion starts at the time `t`, s.
 // Only four orders are compiled: all of them would be a sixth of the binary.
 #[inline(never)]
 fn repair<M: KeptMotion>(motion: &mut M, t: f64) {
@@ -586,47 +585,46 @@ fn largest_slope_defect(tolerance: f64) -> f64 {
     DEFECT * (1.0 + ROUNDING / (STEP_SHARE * tolerance))
 }
 
-/// Advances the motion to the time `clock` after the inputs became constant: within the expansion if it is exact at this
-/// time, otherwise by further expansions. `start` is the time at the start of the expansion with its rounding error. `clock`
-/// has no rounding error, because this error would depend on the lengths of the calls. Before the call the states must be
-/// those at the start of the expansion; after the call they are those at `clock`.
+/// Advances the motion to the time `clock` after the last jump of the inputs or their slopes: within the expansion if it is
+/// exact at this time, otherwise by further expansions. `start` is the time at the start of the expansion with its rounding
+/// error. `clock` has no rounding error, because this error would depend on the lengths of the calls. Before the call the
+/// states must be those at the start of the expansion; after the call they are those at `clock`. The motion gets all times
+/// since the jump.
 ///
 /// # Errors
-/// See [`StepError`].
+/// See [`StepError`]. Times of errors count from the jump.
 #[inline(always)]
 pub fn advance_kept<M: KeptMotion>(
     motion: &mut M,
     (clock, start): (f64, &mut [f64; 2]),
-    begin: f64,
     tolerance: f64,
     steps: &mut Steps,
 ) -> Result<(), StepError> {
-    let mut moved = 0.0;
     if motion.expansion().overwritten > 0 {
-        repair(motion, moved);
+        repair(motion, start[0]);
     }
     loop {
-        steps.add_steps(1, begin + moved)?;
+        steps.add_steps(1, start[0])?;
         let t = (clock - start[0]) - start[1];
         if t <= 0.0 {
             return Ok(()); // an event has ended the call
         }
         if motion.expansion().orders == 0 {
-            motion.start(moved);
+            motion.start(start[0]);
         }
         let order = order_at(motion, t, tolerance);
         let fits = motion.expansion().end.is_none_or(|(_, end)| t <= end);
         let (mut n, mut length) = match order.filter(|n| fits && motion.defect(*n, t) <= DEFECT) {
             Some(n) => (n, t),
             None => {
-                let (n, end) = whole_expansion(motion, tolerance, (begin + moved, steps))?;
+                let (n, end) = whole_expansion(motion, tolerance, (start[0], steps))?;
                 (n, end.min(t))
             }
         };
         let mut event = motion.event(n, length);
         if event.is_some() {
             // The series of the whole expansion is used, because it has the same root whenever the call ends.
-            (n, length) = whole_expansion(motion, tolerance, (begin + moved, steps))?;
+            (n, length) = whole_expansion(motion, tolerance, (start[0], steps))?;
             event = motion.event(n, length).map(|event| event.min(t));
             length = length.min(t);
         }
@@ -638,27 +636,28 @@ pub fn advance_kept<M: KeptMotion>(
             None => length > 0.0 && length.is_finite(),
         };
         if !moves {
-            return Err(StepError::NotFinite { time: begin + moved });
+            return Err(StepError::NotFinite { time: start[0] });
         }
         let is_end = length == t && event.is_none();
         let is_verified = is_end && length <= motion.expansion().verified;
         if event.is_none() && !is_verified {
             motion.store_slopes(n, length);
         }
-        let _ = motion.take(n, length, moved + length, steps)?;
+        let _ = motion.take(n, length, start[0] + length, steps)?;
         if is_verified {
             return Ok(());
         }
+        let end = add_time(*start, length);
         // The derivatives at the end are computed for the comparison; the next expansion needs them, too.
         if event.is_none() {
-            motion.start(moved + length);
+            motion.start(end[0]);
             motion.rates(0);
             motion.expansion().overwrite(1);
             if motion.slope_defect(length / n as f64) > largest_slope_defect(tolerance) {
                 motion.return_to_start();
-                repair(motion, moved);
-                let end = motion.expansion().end.map_or(length, |(_, end)| end.min(length));
-                motion.expansion().end = Some((n, end / 2.0));
+                repair(motion, start[0]);
+                let whole = motion.expansion().end.map_or(length, |(_, end)| end.min(length));
+                motion.expansion().end = Some((n, whole / 2.0));
                 continue;
             }
         }
@@ -666,8 +665,7 @@ pub fn advance_kept<M: KeptMotion>(
             motion.expansion().verified = 2.0 * length;
             return Ok(());
         }
-        moved += length;
-        *start = add_time(*start, length);
+        *start = end;
         motion.keep();
         motion.expansion().clear();
         motion.expansion().orders = usize::from(event.is_none());
@@ -1050,7 +1048,7 @@ mod tests {
             let mut start = self.start;
             let times = (self.clock[0], &mut start);
             let mut steps = Steps::new(100_000, "");
-            advance_kept(self, times, 7.0, tolerance, &mut steps).unwrap();
+            advance_kept(self, times, tolerance, &mut steps).unwrap();
             self.start = start;
         }
     }
@@ -1197,7 +1195,7 @@ mod tests {
             let mut motion =
                 Corner { now, begin, square, root, y, allowed, slope, expansion, compares };
             let (mut steps, times) = (Steps::new(1000, ""), (3.0, &mut [0.0; 2]));
-            advance_kept(&mut motion, times, 0.0, tolerance, &mut steps).unwrap();
+            advance_kept(&mut motion, times, tolerance, &mut steps).unwrap();
             let integral = |s: f64| 0.5 * (s * s.hypot(EPS) + EPS * EPS * (s / EPS).asinh());
             (motion.now[1] - integral(2.0) + integral(-1.0)).abs() / tolerance
         };
