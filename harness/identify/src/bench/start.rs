@@ -145,6 +145,8 @@ impl Response {
             && ratio(self.inertia, other.inertia) < 0.5
     }
 
+    /// Returns start values of the fit: the tank whose first mode has the frequency and the mass of this response, and
+    /// the rest of the inertia as the inertia of the hub. The parameters of the friction come from `friction`.
     pub fn start(&self, bench: Bench, friction: Start) -> Start {
         let length = bench.gravity / (TAU * self.slosh_frequency).powi(2);
         let (d, h) = tank_of_first_mode(length, self.slosh_mass, bench.density);

@@ -61,6 +61,7 @@ fn charts(signals: &Residual) -> Vec<Chart> {
     charts
 }
 
+/// Formats `value` with as many digits as its standard `deviation` justifies.
 pub fn digits(value: f64, deviation: f64) -> String {
     let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
     match value {
