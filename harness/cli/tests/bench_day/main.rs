@@ -1,10 +1,10 @@
 //! Recordings of one day at a simulated bench that differs from the FMU: gyro bias on three axes, a tilting platform
 //! and the thesis's noise. `hubslosh analyse --bench-day` analyses them.
 
-#[path = "../../../identify/examples/twins/bench.rs"]
+#[path = "../../../studies/twins/bench.rs"]
 #[allow(dead_code, reason = "the twins use the rest of it")]
 mod bench;
-#[path = "../../../identify/examples/bench_day/logs.rs"]
+#[path = "../../../studies/bench_day/logs.rs"]
 mod logs;
 
 use std::collections::HashMap;

@@ -2,7 +2,7 @@
 //! those that read recordings.
 
 mod any_fmu;
-#[path = "../../examples/twins/bench.rs"]
+#[path = "../../../studies/twins/bench.rs"]
 #[allow(dead_code, reason = "the example looks at more of it")]
 mod bench;
 mod bench_combination;
@@ -12,7 +12,7 @@ mod bench_simulate;
 mod bench_start;
 mod bench_verdict;
 mod coverage;
-#[path = "../../examples/twins/draw.rs"]
+#[path = "../../../studies/twins/draw.rs"]
 #[allow(dead_code, reason = "the example says more of it")]
 mod draw;
 mod engine_cause;
@@ -20,13 +20,13 @@ mod engine_minimum;
 mod engine_noise;
 mod engine_profile;
 mod estimate;
-#[path = "../../examples/fmu_twin/mod.rs"]
+#[path = "../../../studies/fmu_twin/mod.rs"]
 #[allow(dead_code, reason = "the examples use the rest of it")]
 mod fmu_twin;
 mod force_record;
 mod friction;
 #[allow(dead_code, reason = "the example writes every habit")]
-#[path = "../../examples/twins/habits.rs"]
+#[path = "../../../studies/twins/habits.rs"]
 mod habits;
 mod input_clocks;
 mod input_gaps;
@@ -40,7 +40,7 @@ mod methods_free_decay;
 mod methods_friction;
 mod other_bench;
 mod out_of_range;
-#[path = "../../examples/friction/runs.rs"]
+#[path = "../../../studies/friction/runs.rs"]
 mod runs;
 mod sensors;
 mod solver_noise;

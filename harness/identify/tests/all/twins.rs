@@ -1,4 +1,4 @@
-//! Recordings of the independent bench (`examples/twins`) that were once refused, or for which a wrong value was
+//! Recordings of the independent bench (`harness/studies/twins`) that were once refused, or for which a wrong value was
 //! once reported as certain.
 
 use host::fmu::Fmu;

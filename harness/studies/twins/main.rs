@@ -144,7 +144,7 @@ fn main() -> Result<()> {
             "say" => say = value == "true",
             "habits" if value == "all" => some = HABITS.to_vec(),
             "habits" => some = value.split(',').map(|habit| known(habit)).collect::<Result<_>>()?,
-            _ => bail!("{key} is not asked for; see the head of examples/twins/main.rs"),
+            _ => bail!("{key} is not asked for; see the head of harness/studies/twins/main.rs"),
         }
     }
     let fmu = Fmu::open(pack::packed_for_tests())?;
