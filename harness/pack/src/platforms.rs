@@ -243,7 +243,6 @@ impl Toolchain {
         // With link-time optimisation, as for an FMU, the command is a quarter smaller.
         command.env("CARGO_PROFILE_RELEASE_LTO", "fat");
         command.env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1");
-        command.env("CARGO_PROFILE_RELEASE_STRIP", "symbols");
         let place = || format!("{} ({})", platform.folder, target.triple);
         let built = project::cargo_build(command, false).with_context(place)?;
         let read = |wanted: &str| {

@@ -97,6 +97,7 @@ pub(crate) fn harness_arguments(command: &mut Command) -> Result<()> {
     command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
     command.args(["--package", NATIVE, "--lib", "--features", "hubslosh/shipped"]);
     command.args(["--message-format", "json-render-diagnostics"]);
+    command.args(["--config", "profile.release.package.hubslosh.strip = \"symbols\""]);
     optimise_for_size(command)
 }
 
