@@ -488,9 +488,10 @@ impl CraftMotion {
         self.expansion.clear();
     }
 
-    /// Advances the states by `h` > 0, s: with `is_continued` by the expansion in `state.kept`, and otherwise by a new
-    /// expansion. If the inputs have jumped (`has_jumped`), it starts from the present states, otherwise from the states in
-    /// the field `before`. If an error is returned, the states are invalid, and the expansion in `state.kept` is unchanged.
+    /// Advances the states by `h` > 0, s. With `is_continued` the step continues the expansion in `state.kept`, whose inputs
+    /// must be in the field `inputs`. Otherwise a new expansion starts: from the present states if the inputs have jumped
+    /// (`has_jumped`), else from the states in the field `before`. If an error is returned, the states are invalid, and the
+    /// expansion in `state.kept` is unchanged.
     // The preparation of a step is a function of its own, because both take more instructions if they are compiled together.
     #[inline(never)]
     pub fn advance(
@@ -506,7 +507,6 @@ impl CraftMotion {
         if is_continued {
             x[..changing].copy_from_slice(&kept.x[..changing]);
             (clock, start) = (kept.clock, kept.start);
-            self.inputs = kept.inputs();
             self.start = Start::Kept;
         } else {
             self.expansion.clear();

@@ -136,9 +136,9 @@ impl Spacecraft {
         } = &mut *self.motion;
         let (time, h_wheels, flow, ball, changing) = (*time, *h_wheels, *flow, *ball, *changing);
         before[..changing].copy_from_slice(&x[..changing]);
-        self.motion.inputs = *inputs;
         let drains = self.draining.as_ref().is_some_and(|craft| craft.drains());
         let is_continued = !drains && self.motion.state.kept.is_continued(inputs, h);
+        self.motion.inputs = if is_continued { self.motion.state.kept.inputs() } else { *inputs };
         let has_jumped = !is_continued && self.may_jump(inputs) && self.take_jumps(inputs);
         let done = match &self.draining {
             Some(craft) if drains => {
@@ -374,7 +374,9 @@ impl Spacecraft {
 
     fn take_jumps(&mut self, inputs: &Inputs) -> bool {
         let Some(draining) = self.draining.as_ref().filter(|craft| craft.drains()) else {
-            return self.motion.set_wheels(inputs.h_wheels.value);
+            // A difference of `h_wheels` from its ramp by a rounding error is no jump.
+            return !self.motion.state.kept.is_continued(inputs, 0.0)
+                && self.motion.set_wheels(inputs.h_wheels.value);
         };
         let turned = inputs.h_wheels.value != self.motion.state.h_wheels;
         if turned {

@@ -200,10 +200,10 @@ impl Kept {
             return self.is_used() && self.is_followed(inputs, h);
         }
         // The comparison has no branches, which saves a hundred instructions.
-        let same = |all, (a, b): (&f64, &f64)| all & (a == b);
-        self.is_used()
-            && self.inputs.iter().zip(&inputs.values()).fold(true, same)
-            && self.slopes == [0.0; INPUTS]
+        let ramps = self.inputs.iter().zip(&self.slopes);
+        let same =
+            |all, ((x, slope), now): ((&f64, &f64), &f64)| all & (x == now) & (*slope == 0.0);
+        self.is_used() && ramps.zip(&inputs.values()).fold(true, same)
     }
 
     /// Compares the inputs at the start and at the end of the next step with their ramps. A host computes both with rounding

@@ -336,9 +336,9 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
     [total, rest - (total - sum)]
 }
 
-/// An expansion that calls of [`advance_kept`] continue while the inputs are constant or keep their slopes. Each call computes as many orders as
-/// its end needs. The state at an instant depends only on the start of the expansion and on the time since this start, and
-/// not on the times at which earlier calls have ended.
+/// An expansion that calls of [`advance_kept`] continue while the inputs are constant or keep their slopes. Each call
+/// computes as many orders as its end needs. The state at an instant depends only on the start of the expansion and on the
+/// time since this start, and not on the times at which earlier calls have ended.
 #[derive(Clone, Debug)]
 pub struct Expansion {
     orders: usize,
