@@ -156,7 +156,8 @@ def test_a_wheel_at_its_largest_speed_gains_no_more_momentum(rigid: Craft) -> No
     # the wheel reaches its largest speed after 1 s, between two rows; until then the torque acts
     for run in (looped, opened):
         assert run["z.torque"].to_numpy()[:5].tolist() == [-0.2, -0.2, -0.2, -0.2, 0]
-    assert looped["omega[3]"].tolist() == opened["omega[3]"].tolist()
+    # Only the second run has a torque about the first axis, a ramp; it changes the rounding errors.
+    assert looped["omega[3]"].to_numpy() == pytest.approx(opened["omega[3]"], rel=1e-14)
     assert opened["torque[1]"].iloc[-1] == 0.6 and opened["torque[1]"].iloc[5] == pytest.approx(0.3)
 
 
