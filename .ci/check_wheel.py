@@ -25,10 +25,10 @@ ROOT = Path(__file__).resolve().parents[1]
 IMPORT = 0.2
 """Allowed CPU time of ``import hubslosh``, s."""
 
-FIRST_PLOT = 60.0
+FIRST_PLOT = 30.0
 """Allowed CPU time from the downloaded wheels to the first plot, s."""
 
-REPORT = 180.0
+REPORT = 60.0
 """Allowed CPU time of the campaign with its report, s."""
 
 NEEDS_MORE = {"6_monte_carlo": "distributed", "7_one_loop": "the crate one-loop"}
