@@ -145,19 +145,21 @@ def test_a_wheel_at_its_largest_speed_gains_no_more_momentum(rigid: Craft) -> No
     loop = body.loop(lambda t, y: asked(t), 0.3, 0, command=["z.torque"])
     looped = loop.simulate(6, outputs=["omega[3]"], substeps=1)
     table = pd.DataFrame({"time": [0.0, 3.0, 6.0], "z.torque": [-0.5, 0.1, 0.1]})
+    plain = body.simulate(0, table, step=0.3, outputs=["omega[3]"])
     table["torque[1]"] = [0.0, 0.6, 0.6]
     opened = body.simulate(0, table, step=0.3, outputs=["omega[3]"])
-    for run in (looped, opened):
+    for run in (looped, plain, opened):
         torque, speed = run["z.torque"].to_numpy(), run["z.speed"].to_numpy()
         assert np.abs(speed).max() == 100 and np.abs(torque).max() == 0.2
         turned = 0.01 * (speed - 80) / 300
         assert run["omega[3]"].to_numpy() == pytest.approx(-turned, rel=1e-9, abs=1e-15)
         assert run["z.speed"].iloc[-1] == pytest.approx(100 - 0.1 * 3 / 0.01)
     # the wheel reaches its largest speed after 1 s, between two rows; until then the torque acts
-    for run in (looped, opened):
+    for run in (looped, plain, opened):
         assert run["z.torque"].to_numpy()[:5].tolist() == [-0.2, -0.2, -0.2, -0.2, 0]
-    # Only the second run has a torque about the first axis, a ramp; it changes the rounding errors.
-    assert looped["omega[3]"].to_numpy() == pytest.approx(opened["omega[3]"], rel=1e-14)
+    assert looped["omega[3]"].tolist() == plain["omega[3]"].tolist()
+    # A ramp of torque about the first axis changes the rounding errors of rates up to 7e-4 rad/s.
+    assert np.abs(plain["omega[3]"] - opened["omega[3]"]).max() < 2e-18
     assert opened["torque[1]"].iloc[-1] == 0.6 and opened["torque[1]"].iloc[5] == pytest.approx(0.3)
 
 

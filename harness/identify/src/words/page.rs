@@ -62,7 +62,7 @@ fn charts(signals: &Residual) -> Vec<Chart> {
 }
 
 /// Formats `value` with as many digits as its standard `deviation` justifies.
-pub fn digits(value: f64, deviation: f64) -> String {
+pub fn format_to_deviation(value: f64, deviation: f64) -> String {
     let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
     match value {
         _ if value.abs() < 1e-3 * deviation => "0".into(),
@@ -72,7 +72,7 @@ pub fn digits(value: f64, deviation: f64) -> String {
 }
 
 fn interval(p: &Estimated) -> String {
-    let [low, high] = p.interval.map(|end| digits(end, p.std));
+    let [low, high] = p.interval.map(|end| format_to_deviation(end, p.std));
     if p.interval[1].is_finite() {
         format!("{low} to {high}")
     } else {
@@ -84,7 +84,7 @@ fn parameters<D>(found: &Identified<D>, combinations: &[Combination]) -> Markup 
     let row = |(name, p): (&String, &Estimated)| {
         vec![
             name.clone(),
-            digits(p.value, p.std),
+            format_to_deviation(p.value, p.std),
             format!("{:.1e}", p.std),
             p.percent(p.std).map_or("–".into(), |percent| format!("{:.3}", percent.abs())),
             format!("{:.1e}", p.std_noise),
